@@ -34,6 +34,7 @@ namespace calib::ctl {
   VERB(Effects)           \
   VERB(Tests)             \
   VERB(Contacts)          \
+  VERB(Schema)            \
   VERB(Pack)              \
   VERB(Certs)
 

@@ -163,7 +163,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
   Campaign& campaign = outcome.campaign;
   const bool is_new = is == CampaignIs::kNew;
   ReadContext context(reader, problems, is, limits);
-  MapReader map(*parse.root, "", problems);
+  MapReader map(*parse.root, "", SectionOf("campaign"), problems);
   if (parse.root->kind == YamlNode::Kind::kMap) {
     ReadName(map, campaign);
     ReadModel(map, context, campaign);

@@ -105,10 +105,6 @@ std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
   table.columns_ = ReadColumns(*data, free_names);
   table.factors_ = ReadUnits(*data, free_names);
   table.ReadZeros(*data, free_names);
-  constexpr std::array kStrainWords = {
-      Word{Strain::kEngineering, "engineering"},
-      Word{Strain::kLogarithmic, "logarithmic"},
-  };
   table.strain_ = data->Choice("strain", kStrainWords).value_or(table.strain_);
   table.derived_ = DerivedColumns::Read(*data);
   if (!table.Open(*data, wanted, context)) return std::nullopt;
@@ -128,7 +124,7 @@ std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
 void LaboratoryTable::ReadZeros(MapReader& data, bool free_names) {
   if (auto signs = data.Map("sign")) {
     for (const std::string& name : signs->Keys()) {
-      const auto sign = signs->Integer(name, -1, 1);
+      const auto sign = signs->Integer(name);
       if (sign == 0) signs->Problem(name, "is 0; a sign is 1 or -1");
       if (IsReadable(*signs, name, free_names) && sign) {
         signs_.emplace_back(name, static_cast<double>(*sign));

@@ -9,6 +9,7 @@
 
 #include "server/campaign/file/derived_columns.h"
 #include "server/campaign/file/read_context.h"
+#include "server/campaign/keys/words.h"
 
 namespace calib::campaign {
 
@@ -67,7 +68,6 @@ class LaboratoryTable {
   std::vector<std::pair<std::string, double>> signs_;         // our name, 1 or -1
   std::vector<std::pair<std::string, double>> offsets_;       // our name, SI
   std::vector<std::string> from_first_;  // our names, whose first reading is their zero
-  enum class Strain { kEngineering, kLogarithmic };
   Strain strain_ = Strain::kEngineering;
 };
 

@@ -1,6 +1,7 @@
 #include "server/campaign/file/map_reader.h"
 
 #include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <cmath>
 
@@ -29,8 +30,13 @@ std::optional<Int> ParseInteger(const std::string& text) {
 
 }  // namespace
 
-MapReader::MapReader(const YamlNode& node, std::string path, ProblemList& problems)
-    : node_(&node), path_(std::move(path)), line_(node.line), problems_(&problems) {
+MapReader::MapReader(const YamlNode& node, std::string path, const Section& section,
+                     ProblemList& problems)
+    : node_(&node),
+      path_(std::move(path)),
+      section_(&section),
+      line_(node.line),
+      problems_(&problems) {
   if (node.kind != YamlNode::Kind::kMap) {
     node_ = nullptr;
     problems_->Add(line_, path_,
@@ -48,6 +54,14 @@ const YamlEntry* MapReader::FindEntry(const std::string& key) const {
     if (entry.key == key) return &entry;
   }
   return nullptr;
+}
+
+const Form& MapReader::FormOf(const std::string& key, Form::Kind kind) const {
+  const Key* row = FindKey(*section_, key);
+  const Form* form = row != nullptr ? FindForm(row->form, kind) : nullptr;
+  assert(form != nullptr);
+  static const Form kNone;
+  return form != nullptr ? *form : kNone;
 }
 
 int MapReader::LineOf(const std::string& key) const {
@@ -124,11 +138,26 @@ std::optional<double> ReadQuantity(const YamlNode& node, const std::string& path
   return *value;
 }
 
+std::optional<double> MapReader::Quantity(const std::string& key) {
+  const Form& form = FormOf(key, Form::Kind::kNumber);
+  return Quantity(key, form.unit, form.range);
+}
+
 std::optional<double> MapReader::Quantity(const std::string& key, const std::string& si_unit,
                                           const Range& range) {
   const YamlNode* node = Find(key);
   if (node == nullptr) return std::nullopt;
   return ReadQuantity(*node, PathOf(key), si_unit, range, *problems_);
+}
+
+std::optional<double> MapReader::QuantityIn(const std::string& key, const YamlNode& node) const {
+  const Form& form = FormOf(key, Form::Kind::kNumber);
+  return ReadQuantity(node, PathOf(key), form.unit, form.range, *problems_);
+}
+
+std::optional<std::int64_t> MapReader::Integer(const std::string& key) {
+  const Form& form = FormOf(key, Form::Kind::kWhole);
+  return Integer(key, form.least, static_cast<std::int64_t>(form.most));
 }
 
 std::optional<std::int64_t> MapReader::Integer(const std::string& key, std::int64_t min,
@@ -151,6 +180,14 @@ std::optional<std::uint64_t> MapReader::Seed(const std::string& key) {
   return value;
 }
 
+const std::vector<std::string>& MapReader::WordsOf(const std::string& key) const {
+  return FormOf(key, Form::Kind::kWord).words;
+}
+
+std::optional<std::string> MapReader::Choice(const std::string& key) {
+  return Choice(key, WordsOf(key));
+}
+
 std::optional<std::string> MapReader::Choice(const std::string& key,
                                              const std::vector<std::string>& allowed) {
   auto text = Text(key);
@@ -163,7 +200,7 @@ std::optional<std::string> MapReader::Choice(const std::string& key,
 }
 
 std::optional<bool> MapReader::TrueOrFalse(const std::string& key) {
-  const auto word = Choice(key, {"true", "false"});
+  const auto word = Choice(key, std::vector<std::string>{"true", "false"});
   if (!word) return std::nullopt;
   return *word == "true";
 }
@@ -203,7 +240,7 @@ std::optional<std::vector<std::pair<std::string, std::string>>> MapReader::TextM
 std::optional<MapReader> MapReader::Map(const std::string& key) {
   const YamlNode* node = Find(key);
   if (node == nullptr) return std::nullopt;
-  MapReader map(*node, PathOf(key), *problems_);
+  MapReader map(*node, PathOf(key), SectionOf(FormOf(key, Form::Kind::kMap).section), *problems_);
   if (map.node_ == nullptr) return std::nullopt;
   map.line_ = LineOf(key);
   return map;
@@ -217,7 +254,8 @@ void MapReader::Finish() {
   if (node_ == nullptr) return;
   std::vector<std::string> seen;
   for (const YamlEntry& entry : node_->entries) {
-    if (std::find(known_.begin(), known_.end(), entry.key) == known_.end()) {
+    const bool asked = std::find(known_.begin(), known_.end(), entry.key) != known_.end();
+    if (!asked || FindKey(*section_, entry.key) == nullptr) {
       problems_->Add(entry.line, PathOf(entry.key),
                      absl::StrCat("is an unknown key; ", Suggestion(entry.key, known_)));
     } else if (std::find(seen.begin(), seen.end(), entry.key) != seen.end()) {

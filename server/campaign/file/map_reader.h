@@ -1,6 +1,7 @@
 #pragma once
-// Reads one YAML map key by key, turning every mismatch into a problem. Keys that were never asked
-// for are unknown.
+// Reads one YAML map key by key, turning every mismatch into a problem. Which keys there are and
+// what they hold is said by a section of server/campaign/keys; a key that is none of them, or was
+// never asked for, is unknown.
 
 #include <cstdint>
 #include <optional>
@@ -9,16 +10,17 @@
 
 #include "server/campaign/file/text/problem_list.h"
 #include "server/campaign/file/text/yaml_tree.h"
+#include "server/campaign/keys/sections.h"
 #include "server/campaign/model/range.h"
 #include "server/campaign/model/word_table.h"
 
 namespace calib::campaign {
 
-/// The node and the problem list must outlive the reader. A node that is no map is reported once
-/// and then reads as empty.
+/// The node, the section and the problem list must outlive the reader. A node that is no map is
+/// reported once and then reads as empty.
 class MapReader {
  public:
-  MapReader(const YamlNode& node, std::string path, ProblemList& problems);
+  MapReader(const YamlNode& node, std::string path, const Section& section, ProblemList& problems);
 
   const std::string& path() const { return path_; }
   int line() const { return line_; }
@@ -42,11 +44,21 @@ class MapReader {
   /// A text or a number as written. Empty optional: absent, or a problem was added.
   std::optional<std::string> Text(const std::string& key);
   std::optional<std::string> RequiredText(const std::string& key, const std::string& what);
-  /// A number with an optional unit, in SI.
+  /// A number with an optional unit, in SI, of the unit and range of its key; or where those are
+  /// the catalogue's, of these.
+  std::optional<double> Quantity(const std::string& key);
   std::optional<double> Quantity(const std::string& key, const std::string& si_unit,
                                  const Range& range);
+  /// The same of a node that stands somewhere below the key.
+  std::optional<double> QuantityIn(const std::string& key, const YamlNode& node) const;
+  /// A whole number within the bounds of its key, or these.
+  std::optional<std::int64_t> Integer(const std::string& key);
   std::optional<std::int64_t> Integer(const std::string& key, std::int64_t min, std::int64_t max);
   std::optional<std::uint64_t> Seed(const std::string& key);
+  /// The words that may stand at a key.
+  const std::vector<std::string>& WordsOf(const std::string& key) const;
+  /// One of the words of its key.
+  std::optional<std::string> Choice(const std::string& key);
   /// One of a list of words.
   std::optional<std::string> Choice(const std::string& key,
                                     const std::vector<std::string>& allowed);
@@ -69,9 +81,12 @@ class MapReader {
 
  private:
   const YamlEntry* FindEntry(const std::string& key) const;
+  // The form of this kind that the section gives a key, which has one.
+  const Form& FormOf(const std::string& key, Form::Kind kind) const;
 
   const YamlNode* node_;  // nullptr: was not a map
   std::string path_;
+  const Section* section_;
   int line_ = 0;
   ProblemList* problems_;
   std::vector<std::string> known_;

@@ -17,14 +17,6 @@
 namespace calib::campaign {
 namespace {
 
-constexpr Range kDamping{.min = 0, .max = 1, .max_open = true};
-
-std::vector<std::string> TestNames() {
-  std::vector<std::string> names;
-  for (const dem::TestInfo& test : dem::Tests()) names.push_back(test.name);
-  return names;
-}
-
 // Names stand in tables, file names and on the command line.
 std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
   std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
@@ -123,10 +115,8 @@ void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experi
 void ReadConsolidation(MapReader& map, Experiment& experiment) {
   auto consolidation = map.Map("consolidation");
   if (!consolidation) return;
-  experiment.consolidation.friction_coefficient =
-      consolidation->Quantity("friction_coefficient", "1", {.min = 0, .max = 10});
-  experiment.consolidation.porosity = consolidation->Quantity(
-      "porosity", "1", {.min = 0.2, .max = 0.6, .min_open = true, .max_open = true});
+  experiment.consolidation.friction_coefficient = consolidation->Quantity("friction_coefficient");
+  experiment.consolidation.porosity = consolidation->Quantity("porosity");
   consolidation->Finish();
   if (consolidation->Has("friction_coefficient") == consolidation->Has("porosity")) {
     map.Problem("consolidation", "needs exactly one of friction_coefficient and porosity");
@@ -139,8 +129,8 @@ void ReadInitialStress(MapReader& map, Experiment& experiment) {
   for (const char* key : {"axial", "lateral"}) {
     stress->Require(key, "both principal stresses are needed");
   }
-  const auto axial = stress->Quantity("axial", "Pa", kPositive);
-  const auto lateral = stress->Quantity("lateral", "Pa", kPositive);
+  const auto axial = stress->Quantity("axial");
+  const auto lateral = stress->Quantity("lateral");
   stress->Finish();
   if (axial && lateral) {
     experiment.initial_stress = dem::InitialStress{.axial = *axial, .lateral = *lateral};
@@ -155,13 +145,12 @@ void ReadDamping(MapReader& staging, dem::Staging& out) {
                     "is a list of two: [while straining, while settling], e.g. [0.2, 0.9]");
     return;
   }
-  const std::string path = staging.PathOf("damping");
-  out.damping_loading = ReadQuantity(damping->items[0], path, "1", kDamping, staging.problems());
-  out.damping_settling = ReadQuantity(damping->items[1], path, "1", kDamping, staging.problems());
+  out.damping_loading = staging.QuantityIn("damping", damping->items[0]);
+  out.damping_settling = staging.QuantityIn("damping", damping->items[1]);
 }
 
 void ReadStaging(MapReader& map, Experiment& experiment) {
-  experiment.loading_rate = map.Quantity("loading_rate", "1/s", kPositive);
+  experiment.loading_rate = map.Quantity("loading_rate");
   auto staging = map.Map("staging");
   if (!staging) return;
   if (map.Has("loading_rate")) {
@@ -169,11 +158,9 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
         "staging",
         "goes without loading_rate: loading at a real rate has no stages; keep one of them");
   }
-  experiment.staging.rate = staging->Quantity("rate", "1/s", kPositive);
-  experiment.staging.step =
-      staging->Quantity("step", "1", {.min = 0, .max = 0.1, .min_open = true});
-  experiment.staging.unbalanced =
-      staging->Quantity("unbalanced", "1", {.min = 0, .max = 1, .min_open = true});
+  experiment.staging.rate = staging->Quantity("rate");
+  experiment.staging.step = staging->Quantity("step");
+  experiment.staging.unbalanced = staging->Quantity("unbalanced");
   ReadDamping(*staging, experiment.staging);
   experiment.staging.adaptive =
       staging->TrueOrFalse("adaptive").value_or(experiment.staging.adaptive);
@@ -181,11 +168,11 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
 }
 
 const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experiment& experiment) {
-  const std::vector<std::string> names = TestNames();
-  if (!campaign.precomputed && map.Require("test", "one of " + Listed(names)) == nullptr) {
+  if (!campaign.precomputed &&
+      map.Require("test", "one of " + Listed(map.WordsOf("test"))) == nullptr) {
     return nullptr;
   }
-  experiment.test = map.Choice("test", names).value_or("");
+  experiment.test = map.Choice("test").value_or("");
   return dem::FindTest(experiment.test);
 }
 
@@ -234,7 +221,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
                                    ", which makes its bodies from its settings; remove it"));
     } else {
       experiment.specimens = ReadSpecimens(map, poured, context);
-      experiment.specimen_grains = map.Quantity("specimen_grains", "1", {.min = 1});
+      experiment.specimen_grains = map.Quantity("specimen_grains");
       if (test != nullptr) experiment.meshes = ReadMeshes(map, *test, context);
     }
     if (poured) {
@@ -269,7 +256,8 @@ void ReadExperiments(MapReader& campaign_map, ReadContext& context, Campaign& ca
     return;
   }
   for (std::size_t i = 0; i < node->items.size(); ++i) {
-    MapReader map(node->items[i], absl::StrCat("experiments[", i + 1, "]"), context.problems());
+    MapReader map(node->items[i], absl::StrCat("experiments[", i + 1, "]"), SectionOf("experiment"),
+                  context.problems());
     if (node->items[i].kind == YamlNode::Kind::kMap) ReadExperiment(map, context, campaign);
   }
   const auto calibrates = [](const Experiment& experiment) {

@@ -8,13 +8,13 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/keys/bounds.h"
+#include "server/campaign/keys/words.h"
 
 namespace calib::campaign {
 namespace {
 
 using inference::NoiseMode;
-
-constexpr Range kFraction{.min = 0, .max = 1, .min_open = true, .max_open = true};
 
 void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   const YamlNode* node = map.Find("noise");
@@ -30,7 +30,7 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
     noise->Require("ess_target",
                    "allowed: given, inferred, {inferred: [...]} or {ess_target: 0.2}");
     filter.noise = NoiseMode::kEssTarget;
-    filter.ess_target = noise->Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+    filter.ess_target = noise->Quantity("ess_target").value_or(filter.ess_target);
     noise->Finish();
     return;
   }
@@ -62,35 +62,23 @@ void ReadMethod(MapReader& map, Campaign& campaign) {
   }
 }
 
-using inference::Design;
-constexpr std::array kDesignWords = {
-    Word{Design::kHalton, "halton"},
-    Word{Design::kSobol, "sobol"},
-    Word{Design::kLatinHypercube, "latin_hypercube"},
-    Word{Design::kSymmetricLatinHypercube, "symmetric_latin_hypercube"},
-};
-
 void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
   filter.design = map.Choice("design", kDesignWords).value_or(filter.design);
 }
 
 void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
-  constexpr int kMostSteps = 1000;
-  tmcmc.steps = static_cast<int>(map.Integer("steps", 1, kMostSteps).value_or(tmcmc.steps));
-  tmcmc.target_cv = map.Quantity("target_cv", "1", {.min = 0, .max = 2, .min_open = true})
-                        .value_or(tmcmc.target_cv);
+  tmcmc.steps = static_cast<int>(map.Integer("steps").value_or(tmcmc.steps));
+  tmcmc.target_cv = map.Quantity("target_cv").value_or(tmcmc.target_cv);
 }
 
 void ReadTermination(MapReader& map, Campaign& campaign) {
-  constexpr double kLeast = 4;  // a quarter of it, at the end, is the best run's own misfit
-  constexpr double kMost = 1e6;
   const YamlNode* node = map.Find("termination");
   if (node == nullptr) return;
   if (node->kind == YamlNode::Kind::kScalar && node->scalar == "off") {
     campaign.termination.reset();
     return;
   }
-  campaign.termination = map.Quantity("termination", "1", {.min = kLeast, .max = kMost});
+  campaign.termination = map.Quantity("termination");
 }
 
 void ReadDecisions(MapReader& map, Campaign& campaign) {
@@ -105,27 +93,18 @@ void ReadDecisions(MapReader& map, Campaign& campaign) {
   campaign.decisions = Decisions::kImmediate;
 }
 
-using inference::MixtureOver;
-constexpr std::array kMixtureWords = {
-    Word{MixtureOver::kParameters, "parameters"},
-    Word{MixtureOver::kParametersAndStates, "parameters_and_states"},
-};
-
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
   inference::FilterOptions& filter = campaign.filter;
-  filter.tolerance = map.Quantity("tolerance", "1", kFraction).value_or(filter.tolerance);
-  filter.defensive_share =
-      map.Quantity("defensive_share", "1", {.min = 0, .max = 1, .max_open = true})
-          .value_or(filter.defensive_share);
+  filter.tolerance = map.Quantity("tolerance").value_or(filter.tolerance);
+  filter.defensive_share = map.Quantity("defensive_share").value_or(filter.defensive_share);
   filter.max_components =
-      static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
-  filter.concentration =
-      map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
+      static_cast<int>(map.Integer("max_components").value_or(filter.max_components));
+  filter.concentration = map.Quantity("concentration").value_or(filter.concentration);
   filter.mixture = map.Choice("mixture", kMixtureWords).value_or(filter.mixture);
   ReadDesign(map, filter);
   filter.reversed_path = map.TrueOrFalse("reversed_path").value_or(filter.reversed_path);
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
-    filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+    filter.ess_target = map.Quantity("ess_target").value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
     map.Ignore({"ess_target"});
     map.Problem("ess_target", "is given by noise: {ess_target: ...} already; remove it here");
@@ -189,11 +168,6 @@ void RefuseKeysOfOthers(MapReader& map, Method method) {
 }
 
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
-  constexpr std::int64_t kMostSamples = 1'000'000;
-  constexpr std::int64_t kMostIterations = 1000;
-  constexpr int kFewestChains = 20;
-  constexpr int kMostReplicates = 1000;
-  constexpr int kMostInFlight = 1000;
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
@@ -211,10 +185,10 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
     campaign.samples =
         static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
-    campaign.max_iterations = static_cast<int>(
-        map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
+    campaign.max_iterations =
+        static_cast<int>(map->Integer("max_iterations").value_or(campaign.max_iterations));
     if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
-    if (const auto replicates = map->Integer("replicates", 0, kMostReplicates)) {
+    if (const auto replicates = map->Integer("replicates")) {
       campaign.replicates = static_cast<int>(*replicates);
     }
     ReadFreeze(*map, campaign);
@@ -222,8 +196,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
       campaign.surrogate =
           map->Choice("surrogate", kSurrogateModelWords).value_or(campaign.surrogate);
       ReadTermination(*map, campaign);
-      campaign.in_flight = static_cast<int>(
-          map->Integer("in_flight", 1, kMostInFlight).value_or(campaign.in_flight));
+      campaign.in_flight = static_cast<int>(map->Integer("in_flight").value_or(campaign.in_flight));
     }
     ReadDecisions(*map, campaign);
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
@@ -251,7 +224,7 @@ std::vector<double> ReadRungs(MapReader& map) {
   }
   std::vector<double> rungs;
   for (const YamlNode& item : node->items) {
-    const auto rung = ReadQuantity(item, map.PathOf("rungs"), "1", kFraction, map.problems());
+    const auto rung = map.QuantityIn("rungs", item);
     if (!rung.has_value()) return {};
     if (!rungs.empty() && *rung <= rungs.back()) {
       map.Problem("rungs", absl::StrCat("has ", *rung, " after ", rungs.back(),
@@ -278,11 +251,10 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   EarlyStopping stopping;
   map->Require("discard_at_most", "the posterior mass that stopping early may lose, e.g. 1e-3");
   if (!off) {
-    stopping.discard_at_most =
-        map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+    stopping.discard_at_most = map->Quantity("discard_at_most").value_or(stopping.discard_at_most);
   }
   stopping.rungs = ReadRungs(*map);
-  stopping.exponent = map->Quantity("exponent", "1", {.min = 0, .max = 1, .min_open = true});
+  stopping.exponent = map->Quantity("exponent");
   if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
     map->Problem("rungs",
                  "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
@@ -310,10 +282,9 @@ void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("failure");
   if (!map) return;
   campaign.failure.attempts =
-      static_cast<int>(map->Integer("attempts", 1, 100).value_or(campaign.failure.attempts));
+      static_cast<int>(map->Integer("attempts").value_or(campaign.failure.attempts));
   campaign.failure.pause_above =
-      map->Quantity("pause_above", "1", {.min = 0, .max = 1, .min_open = true})
-          .value_or(campaign.failure.pause_above);
+      map->Quantity("pause_above").value_or(campaign.failure.pause_above);
   map->Finish();
 }
 
@@ -326,9 +297,8 @@ void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
                          "is for campaigns that infer; a design runs what is added to it");
     return;
   }
-  constexpr std::int64_t kMost = 1'000'000'000;
-  campaign.budget.model_evaluations = map->Integer("model_evaluations", 1, kMost);
-  campaign.budget.core_hours = map->Quantity("core_hours", "1", kPositive);
+  campaign.budget.model_evaluations = map->Integer("model_evaluations");
+  campaign.budget.core_hours = map->Quantity("core_hours");
   map->Finish();
 }
 
@@ -337,8 +307,7 @@ void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
   auto map = inference_map.Map("first_proposal");
   if (!map) return;
   FirstProposal proposal;
-  proposal.prior_share =
-      map->Quantity("prior_share", "1", {.min = 0, .max = 1}).value_or(proposal.prior_share);
+  proposal.prior_share = map->Quantity("prior_share").value_or(proposal.prior_share);
   for (const CalibratedParameter& parameter : campaign.parameters) {
     if (!map->Has(parameter.name)) continue;
     auto place = map->Map(parameter.name);

@@ -96,7 +96,7 @@ dem::MaterialUse ReadMaterialUse(MapReader& experiment_map, const dem::TestInfo&
   if (test.needs_packing) {
     if (auto shares = map->Map("grains")) {
       for (const std::string& name : shares->Keys()) {
-        const auto share = shares->Quantity(name, "1", {.min = 0, .max = 1, .min_open = true});
+        const auto share = shares->Quantity(name);
         if (!Has(model.materials, name)) {
           shares->Problem(name, absl::StrCat("is no material of model.materials; ",
                                              Suggestion(name, model.materials)));

@@ -276,7 +276,7 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
   const YamlNode* node =
       campaign_map.Require("model", "it names contact, effects, density and fixed parameters");
   if (node == nullptr) return;
-  MapReader map(*node, campaign_map.PathOf("model"), campaign_map.problems());
+  MapReader map(*node, campaign_map.PathOf("model"), SectionOf("model"), campaign_map.problems());
   if (map.Has("precomputed")) {
     map.Ignore({"precomputed", "contact", "effects", "user_effects", "density", "materials",
                 "pairs", "fixed", "shear_unloading"});  // read with the experiments
@@ -291,16 +291,14 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
   }
   map.Ignore({"precomputed"});
   dem::Model& model = campaign.model;
-  const std::vector<std::string> contacts = NamesOf(dem::Contacts());
-  if (map.Require("contact", "one of " + Listed(contacts)) != nullptr) {
-    model.contact = map.Choice("contact", contacts).value_or("");
+  if (map.Require("contact", "one of " + Listed(map.WordsOf("contact"))) != nullptr) {
+    model.contact = map.Choice("contact").value_or("");
   }
   model.shear_unloading =
       map.Choice("shear_unloading", kShearUnloadingWords).value_or(model.shear_unloading);
   ReadUserEffects(map, context, model);
   ReadEffects(map, context, model);
-  model.density =
-      map.Quantity("density", "kg/m^3", {.min = 0, .min_open = true}).value_or(model.density);
+  model.density = map.Quantity("density").value_or(model.density);
   ReadMaterials(map, model);
   ReadFixed(map, model);
   map.Finish();

@@ -13,11 +13,11 @@
 #include "dem/registry/catalog.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/keys/bounds.h"
 
 namespace calib::campaign {
 namespace {
 
-constexpr Range kNotNegative{.min = 0};
 constexpr double kNextToNothing = 1e-9;  // of the largest reading
 
 struct NoiseSpec {
@@ -59,7 +59,7 @@ std::optional<std::size_t> ReadingAtZero(const std::vector<double>& raw) {
 std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& name) {
   const std::size_t before = noise.problems().size();
   NoiseSpec spec;
-  spec.relative = noise.Quantity("relative", "1", kPositive);
+  spec.relative = noise.Quantity("relative");
   spec.floor = noise.Quantity("floor", UnitOf(name), kNotNegative);
   spec.absolute = noise.Quantity("absolute", UnitOf(name), kPositive);
   spec.column = noise.Text("column").value_or("");
@@ -266,7 +266,7 @@ std::vector<std::string> AllNames(const Campaign& campaign) {
 
 void ReadGroup(const YamlNode& node, const std::string& path, std::set<Member>& taken,
                Campaign& campaign, ProblemList& problems) {
-  MapReader map(node, path, problems);
+  MapReader map(node, path, SectionOf("noise_group"), problems);
   if (node.kind != YamlNode::Kind::kMap) return;
   SharedNoise shared;
   if (map.Require("observables", "the names whose errors share one factor") != nullptr) {
@@ -289,8 +289,8 @@ void ReadGroup(const YamlNode& node, const std::string& path, std::set<Member>& 
       }
     }
   }
-  shared.prior.shape = map.Quantity("shape", "1", kPositive).value_or(shared.prior.shape);
-  shared.prior.rate = map.Quantity("rate", "1", kPositive).value_or(shared.prior.rate);
+  shared.prior.shape = map.Quantity("shape").value_or(shared.prior.shape);
+  shared.prior.rate = map.Quantity("rate").value_or(shared.prior.rate);
   map.Finish();
   if (!shared.members.empty()) campaign.shared_noise.push_back(std::move(shared));
 }
@@ -308,8 +308,8 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
   const bool given = node != nullptr && node->kind != YamlNode::Kind::kNull;
   bool noise_given = false;
   if (given) {
-    MapReader map(*node, path, context.problems());
-    observable.ess_weight = map.Quantity("weight", "1", kPositive).value_or(1);
+    MapReader map(*node, path, SectionOf("observable"), context.problems());
+    observable.ess_weight = map.Quantity("weight").value_or(1);
     noise_given = map.Has("noise") || node->kind != YamlNode::Kind::kMap;
     if (auto noise = map.Map("noise")) {
       const auto spec = ReadSpec(*noise, name);

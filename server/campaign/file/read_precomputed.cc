@@ -221,7 +221,8 @@ class ParametersReader {
       for (std::size_t i = 0; i < column.size(); ++i) {
         const double value = factor * column[i];
         effects_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = value;
-        if (value >= own.min && value <= own.max) continue;
+        const bool is_outside = value < own.min || value > own.max;  // NaN: told by its cell
+        if (!is_outside) continue;
         context_.problems().AddIn(
             path, table.LineOf(i), ColumnOf(keys_.parameter_columns, own.name),
             absl::StrCat(own.name, " is ", value, ", on the other side of its null ", *own.null,

@@ -7,19 +7,13 @@
 #include "absl/strings/str_format.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/keys/words.h"
 
 namespace calib::campaign {
 namespace {
 
 using inference::Prior;
 using inference::PriorKind;
-
-constexpr std::array kKindWords = {
-    Word{PriorKind::kUniform, "uniform"},
-    Word{PriorKind::kLogUniform, "log_uniform"},
-    Word{PriorKind::kNormal, "normal"},
-    Word{PriorKind::kLogNormal, "log_normal"},
-};
 
 // A number that has to be there; NaN after a problem.
 double Required(MapReader& map, const std::string& key, const std::string& unit, const Range& range,
@@ -84,12 +78,12 @@ bool HoldsMass(const Prior& prior, const std::string& key, MapReader& map) {
 namespace {
 
 std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
-  if (map.Require("prior", "one of " + Listed(AllWords(kKindWords))) == nullptr) {
+  if (map.Require("prior", "one of " + Listed(AllWords(kPriorWords))) == nullptr) {
     map.Ignore({"min", "max", "mean", "sd"});
     map.Finish();
     return std::nullopt;
   }
-  const auto kind = map.Choice("prior", kKindWords);
+  const auto kind = map.Choice("prior", kPriorWords);
   if (!kind) {
     map.Ignore({"min", "max", "mean", "sd"});
     map.Finish();
@@ -98,7 +92,7 @@ std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
   Prior prior;
   prior.kind = *kind;
   const bool bounded = prior.kind == PriorKind::kUniform || prior.kind == PriorKind::kLogUniform;
-  const std::string word = WordOf(kKindWords, *kind);
+  const std::string word = WordOf(kPriorWords, *kind);
   const bool read =
       bounded ? ReadBounds(map, unit, word, prior) : ReadMoments(map, unit, word, prior);
   map.Finish();
@@ -133,13 +127,13 @@ std::string UnitOfNumbers(MapReader& map) {
 
 std::optional<Prior> ReadPrior(const YamlNode& node, const std::string& path,
                                const std::string& si_unit, ProblemList& problems) {
-  MapReader map(node, path, problems);
+  MapReader map(node, path, SectionOf("prior"), problems);
   return node.kind == YamlNode::Kind::kMap ? ReadFrom(map, si_unit) : std::nullopt;
 }
 
 std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
                                    ProblemList& problems, std::string& si_unit) {
-  MapReader map(node, path, problems);
+  MapReader map(node, path, SectionOf("prior"), problems);
   if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
   si_unit = UnitOfNumbers(map);
   return ReadFrom(map, si_unit);

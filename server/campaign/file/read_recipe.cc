@@ -9,12 +9,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "server/campaign/keys/bounds.h"
 
 namespace calib::campaign {
 namespace {
 
-constexpr int kMostGrains = 1'000'000;
-constexpr Range kSize{.min = 0, .max = 10, .min_open = true};
 /// A sample of a curve is off it by the mass of its largest grain at most.
 constexpr double kLargestShare = 0.05;
 
@@ -40,7 +39,7 @@ std::optional<dem::Grading> ReadCurve(MapReader& sizes) {
   for (std::size_t k = 0; k < node->items.size(); ++k) {
     const std::string path = absl::StrCat(sizes.PathOf("cumulative"), "[", k + 1, "]");
     const std::vector<YamlNode>& pair = node->items[k].items;
-    const auto size = ReadQuantity(pair[0], path, "m", kSize, sizes.problems());
+    const auto size = ReadQuantity(pair[0], path, "m", kGrainSize, sizes.problems());
     const auto finer = ReadQuantity(pair[1], path, "1", {.min = 0, .max = 1}, sizes.problems());
     if (size && finer) curve.push_back({.radius = *size, .finer = *finer});
   }
@@ -64,9 +63,9 @@ std::optional<dem::Grading> ReadCurve(MapReader& sizes) {
 }
 
 std::optional<dem::Grading> ReadLogNormal(MapReader& sizes) {
-  const auto median = sizes.Quantity("median", "m", kSize);
+  const auto median = sizes.Quantity("median");
   sizes.Require("log_sd", "the standard deviation of the logarithm of the size, e.g. 0.3");
-  const auto log_sd = sizes.Quantity("log_sd", "1", {.min = 0, .max = 1, .min_open = true});
+  const auto log_sd = sizes.Quantity("log_sd");
   if (!median || !log_sd) return std::nullopt;
   return dem::LogNormalGrading(*median, *log_sd);
 }
@@ -114,9 +113,8 @@ void ReadSizes(MapReader& map, dem::PackingRecipe& recipe) {
     return;
   }
   if (sizes->Has("mean")) {
-    recipe.mean_radius = to_radius * sizes->Quantity("mean", "m", kSize).value_or(1);
-    recipe.radius_spread = sizes->Quantity("spread", "1", {.min = 0, .max = 1, .max_open = true})
-                               .value_or(recipe.radius_spread);
+    recipe.mean_radius = to_radius * sizes->Quantity("mean").value_or(1);
+    recipe.radius_spread = sizes->Quantity("spread").value_or(recipe.radius_spread);
   } else {
     auto curve = sizes->Has("cumulative") ? ReadCurve(*sizes) : ReadLogNormal(*sizes);
     if (curve) {
@@ -137,11 +135,9 @@ void ReadSizes(MapReader& map, dem::PackingRecipe& recipe) {
 std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
   const std::size_t before = map.problems().size();
   dem::PackingRecipe recipe;
-  recipe.particles = static_cast<int>(
-      map.Integer("particles", kFewestGrains, kMostGrains).value_or(recipe.particles));
-  const auto porosity = map.Quantity("porosity", "1", kRecipePorosity);
-  const auto void_ratio = map.Quantity(
-      "void_ratio", "1", {.min = 0.25, .max = 1.5, .min_open = true, .max_open = true});
+  recipe.particles = static_cast<int>(map.Integer("particles").value_or(recipe.particles));
+  const auto porosity = map.Quantity("porosity");
+  const auto void_ratio = map.Quantity("void_ratio");
   if (poured) {
     for (const char* key : {"porosity", "void_ratio", "aspect", "pressure"}) {
       if (map.Has(key)) map.Problem(key, "has no meaning here: the test pours the grains itself");
@@ -154,9 +150,8 @@ std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
   if (porosity) recipe.porosity = *porosity;
   if (void_ratio) recipe.porosity = *void_ratio / (1 + *void_ratio);
   ReadSizes(map, recipe);
-  recipe.aspect = map.Quantity("aspect", "1", kRecipeAspect).value_or(recipe.aspect);
-  recipe.pressure =
-      map.Quantity("pressure", "Pa", {.min = 0, .min_open = true}).value_or(recipe.pressure);
+  recipe.aspect = map.Quantity("aspect").value_or(recipe.aspect);
+  recipe.pressure = map.Quantity("pressure").value_or(recipe.pressure);
   recipe.seed = map.Seed("seed").value_or(recipe.seed);
   map.Finish();
   if (map.problems().size() > before) return std::nullopt;

@@ -15,14 +15,11 @@
 namespace calib::campaign {
 namespace {
 
-constexpr std::int64_t kMostStreams = 1'000'000;
-
 // One row: a value for every parameter, and the sample it is to be like.
 void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Campaign& campaign,
              ProblemList& problems) {
-  MapReader map(node, path, problems);
-  campaign.table->like.push_back(
-      static_cast<int>(map.Integer("like", 0, kMostStreams).value_or(row)));
+  MapReader map(node, path, SectionOf("row"), problems);
+  campaign.table->like.push_back(static_cast<int>(map.Integer("like").value_or(row)));
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const CalibratedParameter& parameter = campaign.parameters[j];
     const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr

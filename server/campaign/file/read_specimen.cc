@@ -9,12 +9,12 @@
 #include "dem/particles/packing.h"
 #include "dem/particles/random_cloud.h"
 #include "server/campaign/file/read_recipe.h"
+#include "server/campaign/keys/bounds.h"
 #include "server/campaign/model/sha256.h"
 
 namespace calib::campaign {
 namespace {
 
-constexpr int kMostRealizations = 1000;
 constexpr std::size_t kMostProblems = 10;
 
 // Number of the line on which a grain stands.
@@ -159,7 +159,7 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
 }  // namespace
 
 std::vector<Specimen> ReadSpecimens(MapReader& experiment, bool poured, ReadContext& context) {
-  const auto realizations = experiment.Integer("realizations", 1, kMostRealizations);
+  const auto realizations = experiment.Integer("realizations");
   if (experiment.Require("packing", "{file: ...}, {files: [...]} or {generate: {...}}") ==
       nullptr) {
     return {};

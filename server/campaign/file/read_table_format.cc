@@ -9,8 +9,6 @@
 namespace calib::campaign {
 namespace {
 
-constexpr int kMostSkipped = 1000000;  // Chosen: beyond any file of readings
-
 std::optional<Parting> ReadSeparator(MapReader& data) {
   struct Separator {
     const char* sign;
@@ -65,8 +63,8 @@ TableFormat ReadTableFormat(MapReader& data) {
   TableFormat format;
   format.parting = ReadSeparator(data);
   format.decimal = data.Choice("decimal", kMarks);
-  format.skip = static_cast<int>(data.Integer("skip", 0, kMostSkipped).value_or(0));
-  format.header = !data.Choice("header", std::vector<std::string>{"none"}).has_value();
+  format.skip = static_cast<int>(data.Integer("skip").value_or(0));
+  format.header = !data.Choice("header").has_value();
   ReadRows(data, format);
   format.where = data.TextMap("where").value_or(format.where);
   format.missing = data.TextList("missing").value_or(format.missing);

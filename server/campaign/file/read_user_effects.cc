@@ -18,6 +18,7 @@
 #include "server/campaign/file/formula_units.h"
 #include "server/campaign/file/read_prior.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/keys/words.h"
 
 namespace calib::campaign {
 namespace {
@@ -111,14 +112,6 @@ std::map<std::string, double> MediansOfOthers(const std::vector<dem::ParameterIn
   return medians;
 }
 
-// On which side of its null value a strength may be.
-enum class Sign { kPositive, kNegative, kEither };
-constexpr std::array kSignWords = {
-    Word{Sign::kPositive, "positive"},
-    Word{Sign::kNegative, "negative"},
-    Word{Sign::kEither, "either"},
-};
-
 void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::EffectInfo& effect) {
   const std::size_t before = map.problems().size();
   dem::ParameterInfo info;
@@ -142,11 +135,11 @@ void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::Ef
   if (info.null_value) {
     const double null = *info.null_value;
     Sign sign = Sign::kEither;
-    if (prior && prior->min >= null) sign = Sign::kPositive;
-    if (prior && prior->max <= null) sign = Sign::kNegative;
+    if (prior && prior->min >= null) sign = Sign::kPlus;
+    if (prior && prior->max <= null) sign = Sign::kMinus;
     sign = map.Choice("sign", kSignWords).value_or(sign);
-    if (sign == Sign::kPositive) info.min = null;
-    if (sign == Sign::kNegative) info.max = null;
+    if (sign == Sign::kPlus) info.min = null;
+    if (sign == Sign::kMinus) info.max = null;
     both = sign == Sign::kEither;
     if (prior && (prior->min < info.min || prior->max > info.max)) {
       map.Problem("prior", absl::StrCat("reaches beyond the null ", null, ", but its sign is ",

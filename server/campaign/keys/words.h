@@ -1,0 +1,46 @@
+#pragma once
+// Words of the campaign file that only its reader knows.
+
+#include <array>
+
+#include "inference/filter/iterative_filter.h"
+#include "inference/prior/prior.h"
+#include "server/campaign/model/word_table.h"
+
+namespace calib::campaign {
+
+inline constexpr std::array kDesignWords = {
+    Word{inference::Design::kHalton, "halton"},
+    Word{inference::Design::kSobol, "sobol"},
+    Word{inference::Design::kLatinHypercube, "latin_hypercube"},
+    Word{inference::Design::kSymmetricLatinHypercube, "symmetric_latin_hypercube"},
+};
+
+inline constexpr std::array kMixtureWords = {
+    Word{inference::MixtureOver::kParameters, "parameters"},
+    Word{inference::MixtureOver::kParametersAndStates, "parameters_and_states"},
+};
+
+inline constexpr std::array kPriorWords = {
+    Word{inference::PriorKind::kUniform, "uniform"},
+    Word{inference::PriorKind::kLogUniform, "log_uniform"},
+    Word{inference::PriorKind::kNormal, "normal"},
+    Word{inference::PriorKind::kLogNormal, "log_normal"},
+};
+
+/// How the laboratory computed its strains.
+enum class Strain { kEngineering, kLogarithmic };
+inline constexpr std::array kStrainWords = {
+    Word{Strain::kEngineering, "engineering"},
+    Word{Strain::kLogarithmic, "logarithmic"},
+};
+
+/// On which side of its null value a strength may be.
+enum class Sign { kPlus, kMinus, kEither };
+inline constexpr std::array kSignWords = {
+    Word{Sign::kPlus, "positive"},
+    Word{Sign::kMinus, "negative"},
+    Word{Sign::kEither, "either"},
+};
+
+}  // namespace calib::campaign
