@@ -10,7 +10,9 @@ namespace calib::ctl {
   VERB(Validate)          \
   VERB(List)              \
   VERB(Show)              \
+  VERB(Lineage)           \
   VERB(Watch)             \
+  VERB(Page)              \
   VERB(Posterior)         \
   VERB(Samples)           \
   VERB(States)            \
