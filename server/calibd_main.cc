@@ -4,8 +4,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
+#include <memory>
 
+#include "proto/rpc/access.h"
 #include "proto/rpc/address.h"
+#include "server/page/page.h"
 #include "server/service/server.h"
 
 namespace {
@@ -36,6 +39,30 @@ void AddLimits(CLI::App& app, calib::service::Limits& limits) {
   add("--max-grains", limits.grains, "grains in the packing files of one campaign");
 }
 
+/// The live page over a server that serves. A page that cannot be is warned of: what is computed
+/// does not depend on it.
+std::unique_ptr<calib::page::Page> ServePage(const std::string& http,
+                                             const calib::service::ServerOptions& options,
+                                             calib::service::Server& server) {
+  const auto token = calib::rpc::ReadToken(options.state_dir + "/token");
+  auto page =
+      token.ok()
+          ? calib::page::Page::Start(
+                {.listen = http,
+                 .tls = options.tls,
+                 .insecure = options.insecure,
+                 .token = *token,
+                 .connect =
+                     [&server] { return calib::client::Client::Over(server.InProcessChannel()); }})
+          : absl::StatusOr<std::unique_ptr<calib::page::Page>>(token.status());
+  if (!page.ok()) {
+    std::cerr << "calibd: no page: " << page.status().message() << '\n';
+    return nullptr;
+  }
+  std::cerr << "page: " << (*page)->address() << '\n';
+  return *std::move(page);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -60,6 +87,13 @@ int main(int argc, char** argv) {
       ->envname("CALIB_TLS");
   app.add_flag("--insecure", options.insecure,
                "listen in plain text where other machines reach it");
+  std::string http;
+  app.add_option("--http", http,
+                 "HOST:PORT of the live page and its documents, port 0 for a free one [none]")
+      ->check([](const std::string& address) {
+        return calib::rpc::SocketPathOf(address).empty() ? calib::rpc::ProblemOfAddress(address, 0)
+                                                         : "a page is served over HOST:PORT";
+      });
   app.add_option("--lease-ms", lease_ms,
                  "an evaluation is handed to another worker after this silence")
       ->check(CLI::Range(50, 86'400'000))
@@ -98,8 +132,10 @@ int main(int argc, char** argv) {
     std::cerr << "calibd: " << server.status().message() << '\n';
     return absl::IsInvalidArgument(server.status()) ? 2 : 1;
   }
+  auto page = http.empty() ? nullptr : ServePage(http, options, **server);
   int signal = 0;
   sigwait(&signals, &signal);
+  page.reset();
   (*server)->Shutdown(kShutdown);
   return failed ? 1 : 0;
 }

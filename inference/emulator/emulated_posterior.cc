@@ -117,9 +117,12 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator,
   }
   const PrincipalComponents& components = emulator.components();
   result.predictive_mean.resize(t);
-  result.predictive_q05.resize(t);
-  result.predictive_q50.resize(t);
-  result.predictive_q95.resize(t);
+  const std::pair<double, Eigen::VectorXd*> quantiles[] = {
+      {0.025, &result.predictive_q025}, {0.05, &result.predictive_q05},
+      {0.25, &result.predictive_q25},   {0.5, &result.predictive_q50},
+      {0.75, &result.predictive_q75},   {0.95, &result.predictive_q95},
+      {0.975, &result.predictive_q975}};
+  for (const auto& [p, quantile] : quantiles) quantile->resize(t);
   std::vector<double> history(static_cast<std::size_t>(n));
   for (Index k = 0; k < t; ++k) {
     const Reading& reading = data.readings[static_cast<std::size_t>(k)];
@@ -129,15 +132,10 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator,
           reading.value + reading.sd * (components.mean[k] + column[i]);
     }
     result.predictive_mean[k] = reading.value + reading.sd * (components.mean[k] + column.mean());
-    const auto quantile = [&history](double p) {
-      const auto at =
-          history.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(history.size()));
-      std::nth_element(history.begin(), at, history.end());
-      return *at;
-    };
-    result.predictive_q05[k] = quantile(0.05);
-    result.predictive_q50[k] = quantile(0.5);
-    result.predictive_q95[k] = quantile(0.95);
+    std::sort(history.begin(), history.end());
+    for (const auto& [p, quantile] : quantiles) {
+      (*quantile)[k] = history[static_cast<std::size_t>(p * static_cast<double>(history.size()))];
+    }
   }
 }
 

@@ -82,6 +82,7 @@ struct EmulatedResult {
   /// quantiles over parameters and over what the emulator does not know of the mean history.
   /// Without a run's scatter and the readings' noise.
   Eigen::VectorXd predictive_mean, predictive_q05, predictive_q50, predictive_q95;
+  Eigen::VectorXd predictive_q025, predictive_q25, predictive_q75, predictive_q975;
 
   /// Root mean square error of a run predicted from the others, over the relevant runs and all
   /// readings, in units of the noise sd (of the inferred one with kInferred).

@@ -7,6 +7,7 @@
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/security/tls_certificate_provider.h>
 #include <grpcpp/security/tls_credentials_options.h>
+#include <grpcpp/server.h>
 #include <grpcpp/support/channel_arguments.h>
 #include <grpcpp/support/client_interceptor.h>
 #include <netdb.h>
@@ -164,6 +165,12 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address, const Acc
   }
   return grpc::experimental::CreateCustomChannelWithInterceptors(address, CredentialsOf(access),
                                                                  arguments, std::move(factories));
+}
+
+std::shared_ptr<grpc::Channel> OpenChannelInside(grpc::Server& server, const std::string& token) {
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> factories;
+  factories.push_back(std::make_unique<ShowTokenFactory>(Access{.token = token}));
+  return server.experimental().InProcessChannelWithInterceptors({}, std::move(factories));
 }
 
 absl::Status WhyNotConnected(const std::string& address, const Access& access) {

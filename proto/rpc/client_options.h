@@ -11,6 +11,7 @@
 namespace grpc {
 class Channel;
 class ClientContext;
+class Server;
 }  // namespace grpc
 
 namespace calib::rpc {
@@ -27,6 +28,9 @@ inline constexpr std::chrono::seconds kBlobDeadline{120};
 /// and takes only a server of its authority that is certified for the host of the address and not
 /// revoked (crl.pem); without, plain text. A token is shown with each call.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address, const Access& access);
+
+/// A channel to a server of this very process, with a token that is shown with each call.
+std::shared_ptr<grpc::Channel> OpenChannelInside(grpc::Server& server, const std::string& token);
 
 /// Why a channel to the address does not connect, for people. UNAVAILABLE: nothing listens there.
 /// FAILED_PRECONDITION: something does, and speaks otherwise (plain text, TLS), shows a certificate

@@ -204,6 +204,14 @@ absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& addre
   return std::unique_ptr<Client>(new Client(std::move(impl)));
 }
 
+std::unique_ptr<Client> Client::Over(std::shared_ptr<grpc::Channel> channel) {
+  auto impl = std::make_unique<Impl>();
+  impl->connection.stub = v1::Campaigns::NewStub(channel);
+  impl->connection.channel = std::move(channel);
+  impl->connection.find_server = [] { return Place{}; };
+  return std::unique_ptr<Client>(new Client(std::move(impl)));
+}
+
 void Client::OnLoss(FindServer find_server) {
   impl_->connection.find_server = std::move(find_server);
 }
@@ -269,6 +277,27 @@ absl::Status Client::Watch(const std::string& campaign,
         return reader->Finish();
       });
   return checked.ok() ? watched : checked;
+}
+
+absl::Status Client::WatchChanges(const std::stop_token& stop,
+                                  const std::function<void(const v1::Changes&)>& seen) {
+  grpc::ClientContext context;
+  const auto reader = impl_->connection.stub->WatchChanges(&context, v1::WatchChangesRequest());
+  const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+  absl::Status checked;
+  v1::Changes changes;
+  while (checked.ok() && reader->Read(&changes)) {
+    checked = Checked(changes);
+    if (checked.ok()) {
+      seen(changes);
+    } else {
+      context.TryCancel();
+    }
+  }
+  const grpc::Status ended = reader->Finish();
+  if (!checked.ok() || stop.stop_requested()) return checked;
+  return ended.ok() ? absl::UnavailableError("the server has ended the stream")
+                    : rpc::FromGrpc(ended);
 }
 
 absl::StatusOr<v1::Posterior> Client::GetPosterior(const std::string& campaign,

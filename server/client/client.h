@@ -5,12 +5,17 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "proto/rpc/access.h"
+
+namespace grpc {
+class Channel;
+}
 
 namespace calib::client {
 
@@ -25,6 +30,9 @@ class Client {
   /// server refuses it, as a certificate that was renewed, the call is made once more.
   static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address,
                                                          const rpc::AccessChoice& access = {});
+  /// Of a server in this very process (service::Server::InProcessChannel). One that is lost is not
+  /// waited for.
+  static std::unique_ptr<Client> Over(std::shared_ptr<grpc::Channel> channel);
   /// Where a server is, and what is shown there.
   struct Place {
     std::string address{};  ///< empty: it is hopeless to look for one
@@ -46,6 +54,10 @@ class Client {
   /// Calls `seen` with every status until the campaign ends.
   absl::Status Watch(const std::string& campaign,
                      const std::function<void(const v1::CampaignStatus&)>& seen);
+  /// Calls `seen` with every message of WatchChanges until `stop`, or until the server is lost
+  /// (UNAVAILABLE), which is not waited for.
+  absl::Status WatchChanges(const std::stop_token& stop,
+                            const std::function<void(const v1::Changes&)>& seen);
   absl::StatusOr<v1::Posterior> GetPosterior(const std::string& campaign,
                                              std::optional<int> iteration);
   absl::StatusOr<std::vector<v1::Sample>> GetSamples(const std::string& campaign);

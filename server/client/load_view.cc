@@ -3,7 +3,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
+#include "proto/rpc/digest.h"
 #include "server/campaign/file/campaign_file.h"
 
 namespace calib::client {
@@ -28,6 +30,29 @@ absl::StatusOr<campaign::Campaign> LoadCampaign(Client& client, const v1::Campai
   return std::move(outcome.campaign);
 }
 
+absl::StatusOr<CampaignShelf::Read> CampaignShelf::Get(Client& client,
+                                                       const v1::CampaignSource& source) {
+  constexpr std::size_t kMost = 4;  // some may hold tables of many MB
+  const std::string key = rpc::Sha256Hex(absl::StrCat(
+      source.campaign_file(), "\n", source.has_seed() ? absl::StrCat(source.seed()) : "none", "\n",
+      source.reading_rules(), "\n",
+      absl::StrJoin(
+          std::map<std::string, std::string>(source.files().begin(), source.files().end()), "\n",
+          absl::PairFormatter("="))));
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const auto& [of, read] : last_) {
+      if (of == key) return read;
+    }
+  }
+  ASSIGN_OR_RETURN(auto campaign, LoadCampaign(client, source));
+  auto read = std::make_shared<const campaign::Campaign>(std::move(campaign));
+  absl::MutexLock lock(&mutex_);
+  last_.emplace_front(key, read);
+  if (last_.size() > kMost) last_.pop_back();
+  return read;
+}
+
 absl::StatusOr<std::map<std::pair<std::string, int>, report::StateHistory>> LoadStates(
     Client& client, const std::string& campaign, std::optional<int> sample) {
   ASSIGN_OR_RETURN(const auto messages, client.GetStates(campaign, sample));
@@ -41,14 +66,16 @@ absl::StatusOr<std::map<std::pair<std::string, int>, report::StateHistory>> Load
   return states;
 }
 
-absl::StatusOr<report::CampaignView> LoadView(Client& client, const std::string& campaign) {
+absl::StatusOr<report::CampaignView> LoadView(Client& client, const std::string& campaign,
+                                              CampaignShelf* shelf) {
   report::CampaignView view;
   ASSIGN_OR_RETURN(auto status, client.Show(campaign));
   view.status = std::move(status);
   ASSIGN_OR_RETURN(auto source, client.GetSource(campaign));
   view.source = std::move(source);
-  ASSIGN_OR_RETURN(auto read, LoadCampaign(client, view.source));
-  view.campaign = std::move(read);
+  CampaignShelf own;
+  ASSIGN_OR_RETURN(const auto read, (shelf != nullptr ? *shelf : own).Get(client, view.source));
+  view.campaign = *read;
   auto posterior = client.GetPosterior(campaign, std::nullopt);
   if (posterior.ok()) {
     view.posterior = *std::move(posterior);

@@ -35,7 +35,8 @@ class Session {
 
   Client& client() { return *client_; }
   const std::string& address() const { return address_; }  ///< of the server
-  bool shows_certificate() const;                          ///< --tls or $CALIB_TLS, and no socket
+  Client::Place place() const { return {.address = address_, .access = AccessAt(address_)}; }
+  bool shows_certificate() const;  ///< --tls or $CALIB_TLS, and no socket
   /// The folder is served by another process, to which this session is connected. When that ends,
   /// this one serves the folder, unless it was calibd, which is waited for.
   bool is_guest() const { return server_ == nullptr; }

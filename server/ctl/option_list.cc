@@ -39,6 +39,15 @@ Option OptionList::Texts(const std::string& names, std::vector<std::string>& val
   return Option(option);
 }
 
+Option OptionList::OptionalText(const std::string& names, std::optional<std::string>& value,
+                                const std::string& help) {
+  const auto read = [&value](const CLI::results_t& words) {
+    value = words.empty() ? "" : words.front();
+    return true;
+  };
+  return Option(verb_->add_option(names, read, help)->expected(0, 1));
+}
+
 Option OptionList::Flag(const std::string& names, bool& value, const std::string& help) {
   return Option(verb_->add_flag(names, value, help));
 }

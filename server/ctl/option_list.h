@@ -37,6 +37,9 @@ class OptionList {
   /// An option that may be given more than once, with one text each time; at its place: all words
   /// that are left.
   Option Texts(const std::string& names, std::vector<std::string>& values, const std::string& help);
+  /// An option whose text may be left out: it is empty then.
+  Option OptionalText(const std::string& names, std::optional<std::string>& value,
+                      const std::string& help);
   Option Flag(const std::string& names, bool& value, const std::string& help);
 
   /// A whole number from 0 on; others are refused, also those that are too large.

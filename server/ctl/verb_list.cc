@@ -11,7 +11,9 @@ namespace calib::ctl {
   VERB(Validate)          \
   VERB(List)              \
   VERB(Show)              \
+  VERB(Lineage)           \
   VERB(Watch)             \
+  VERB(Page)              \
   VERB(Posterior)         \
   VERB(Samples)           \
   VERB(States)            \

@@ -122,6 +122,11 @@ void AddBands(const Definition& definition, const inference::EmulatedResult& emu
     band.add_mean(emulated.predictive_mean[row]);
     band.add_q05(emulated.predictive_q05[row]);
     band.add_q95(emulated.predictive_q95[row]);
+    band.add_q025(emulated.predictive_q025[row]);
+    band.add_q25(emulated.predictive_q25[row]);
+    band.add_q50(emulated.predictive_q50[row]);
+    band.add_q75(emulated.predictive_q75[row]);
+    band.add_q975(emulated.predictive_q975[row]);
   }
   for (auto& [key, band] : bands) {
     *message.add_bands() = std::move(band);

@@ -155,7 +155,7 @@ void Scheduler::LoadAside(std::int64_t campaign) {
         Advance(campaign);
         Dispatch();
       }
-      ++version_;
+      StateChanged(campaign);
       DoneLoading(campaign);
     };
   });
@@ -357,7 +357,7 @@ void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::strin
     reply(status);
     return;
   }
-  ++version_;
+  StateChanged(run.id());
   Enqueue(run);
   Write(
       run.id(),
@@ -462,6 +462,7 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
       },
       reply);
   runs_.erase(campaign);
+  arrivals_.erase(campaign);
   for (const LeaseEntry& lease : held) {
     if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
       v1::ServerMessage message;
@@ -490,7 +491,17 @@ void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, con
         }
       },
       reply);
-  ++version_;
+  StateChanged(campaign);
+}
+
+void Scheduler::Concluded(std::int64_t campaign) {
+  Changed(campaign);
+  changed_[campaign].concluded = version_;
+}
+
+void Scheduler::StateChanged(std::int64_t campaign) {
+  Concluded(campaign);
+  list_changed_ = version_;
 }
 
 void Scheduler::RefreshView(CampaignRun& run) {
@@ -502,7 +513,7 @@ void Scheduler::RefreshView(CampaignRun& run) {
       viewing_.erase(id);
       if (CampaignRun* looked_at = FindRun(id); looked_at != nullptr) {
         looked_at->SetView(view);
-        ++version_;
+        Changed(id);
       }
     };
   });
@@ -514,7 +525,7 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
     return std::nullopt;
   }
   RefreshView(*run);
-  LiveStatus live{.view = run->view()};
+  LiveStatus live{.view = run->view(), .states_per_second = StatesPerSecond(campaign)};
   const auto& [seconds, ended] = durations_[campaign];
   const int slots = workers_.Slots();
   if (ended > 0 && slots > 0) {
@@ -523,6 +534,11 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
     live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
   }
   return live;
+}
+
+double Scheduler::StatesPerSecond(std::int64_t campaign) {
+  const auto arrivals = arrivals_.find(campaign);
+  return arrivals == arrivals_.end() ? 0 : arrivals->second.PerSecond(ports_.Now());
 }
 
 std::map<std::int64_t, LiveStatus> Scheduler::AllLive() {
@@ -635,15 +651,21 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
         scheduler::Write(plan, campaign, progress, now, t);
       },
       [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
+       changes_state = plan.event.has_value(),
        stop_below = plan.stop_below](const absl::Status& status) {
         computing_.erase(campaign);
-        ++version_;
+        if (changes_state) {
+          StateChanged(campaign);
+        } else {
+          Concluded(campaign);
+        }
         CampaignRun* planned = FindRun(campaign);
         if (!status.ok() || planned == nullptr) {
           return;
         }
         if (over) {
           runs_.erase(campaign);
+          arrivals_.erase(campaign);
           Dispatch();
           return;
         }

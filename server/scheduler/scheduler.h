@@ -16,6 +16,7 @@
 #include "calib/v1/worker.pb.h"
 #include "server/scheduler/campaign_run.h"
 #include "server/scheduler/growth.h"
+#include "server/scheduler/leases/arrival_rate.h"
 #include "server/scheduler/leases/lease_table.h"
 #include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/plan.h"
@@ -35,6 +36,14 @@ struct SchedulerOptions {
 struct LiveStatus {
   LiveView view{};          ///< as it was computed last, aside
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
+  double states_per_second = 0;
+};
+
+/// When something of a campaign changed last, as versions of the scheduler; 0: not since it
+/// started.
+struct ChangedAt {
+  std::uint64_t any = 0;
+  std::uint64_t concluded = 0;  ///< posterior, findings, what they are compared with, or its end
 };
 
 /// A single-threaded state machine: every call comes on one strand, where its Ports run its
@@ -100,6 +109,15 @@ class Scheduler {
   std::map<std::int64_t, LiveStatus> AllLive();
   /// Grows whenever something changed that a status shows.
   std::uint64_t version() const { return version_; }
+  /// By campaign, deleted ones included.
+  const std::map<std::int64_t, ChangedAt>& changed() const { return changed_; }
+  /// When a campaign came, went or changed its state, and when what workers do changed.
+  std::uint64_t list_changed() const { return list_changed_; }
+  std::uint64_t workers_changed() const { return workers_changed_; }
+  /// That came in of late; 0 of a campaign that is not live.
+  double StatesPerSecond(std::int64_t campaign);
+  /// What is concluded of a campaign has changed, as by a finding that was kept.
+  void Concluded(std::int64_t campaign);
   /// Campaigns that are not over.
   std::size_t live() const { return runs_.size(); }
 
@@ -198,6 +216,11 @@ class Scheduler {
   void ComputePlan(CampaignRun& run);
   void Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& plan);
 
+  // What changed, for version() and changed()
+  void Changed(std::int64_t campaign) { changed_[campaign].any = ++version_; }
+  void StateChanged(std::int64_t campaign);
+  void WorkersChanged() { workers_changed_ = ++version_; }
+
   Ports& ports_;
   SchedulerOptions options_;
   LeaseTable leases_;
@@ -217,6 +240,10 @@ class Scheduler {
   std::int64_t last_attempt_ = 0;
   std::int64_t last_campaign_ = 0;
   std::uint64_t version_ = 0;
+  std::map<std::int64_t, ChangedAt> changed_;
+  std::uint64_t list_changed_ = 0;
+  std::uint64_t workers_changed_ = 0;
+  std::map<std::int64_t, ArrivalRate> arrivals_;  // of states, by campaign that is not over
 };
 
 }  // namespace calib::scheduler

@@ -78,7 +78,7 @@ void Scheduler::Taken(std::int64_t campaign, const std::vector<EvaluationKey>& k
     };
     return;
   }
-  ++version_;
+  Changed(campaign);
   Enqueue(*run);
   Advance(campaign);
   Dispatch();

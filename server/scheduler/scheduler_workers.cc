@@ -117,7 +117,7 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
                AttemptOutcome::kLost, true);
     }
   }
-  ++version_;
+  WorkersChanged();
   Dispatch();
   return absl::OkStatus();
 }
@@ -125,7 +125,7 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
 void Scheduler::Disconnected(std::int64_t session) {
   // Its leases stay: the worker may only have lost the connection and go on computing.
   workers_.Disconnect(session);
-  ++version_;
+  WorkersChanged();
 }
 
 void Scheduler::SendDrain(std::int64_t session) {
@@ -237,7 +237,8 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
       records.resize(i + 1);  // what was computed beyond is not kept: it depends on who was faster
     }
   }
-  ++version_;
+  Changed(key.campaign);
+  arrivals_[key.campaign].Add(ports_.Now(), static_cast<std::int64_t>(records.size()));
   if (stop) {
     StopEarly(session, *leases_.Release(batch.attempt()), std::move(records));
     return;
@@ -377,7 +378,12 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   CampaignRun& run = *FindRun(lease.key.campaign);
   const int failures = run.Find(lease.key)->failures;
   run.SetStatus(lease.key, status, failures);
-  ++version_;
+  Changed(lease.key.campaign);
+  WorkersChanged();
+  // Before an iteration is complete, and where held-out tests are run, each run counts by itself.
+  if (run.progress().iteration == 0 || run.progress().phase != campaign::Phase::kCalibrating) {
+    Concluded(lease.key.campaign);
+  }
   const bool diverged = status == EvaluationStatus::kDiverged;
   const bool resting = status == EvaluationStatus::kStoppedEarly;
   const std::string digest = resting ? "" : run.Find(lease.key)->digest;
@@ -430,7 +436,8 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   v1::Finished finished = how;
   finished.set_attempt(lease.attempt);
   CampaignRun* run = FindRun(lease.key.campaign);
-  ++version_;
+  Changed(lease.key.campaign);
+  WorkersChanged();
   if (run == nullptr) {
     ports_.Write([end = ToRecord(finished, outcome)](Transaction& t) { t.EndAttempt(end); },
                  [](const absl::Status&) {});
@@ -500,7 +507,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   leases_.Grant(attempt, key, worker.hello.name(), ports_.Now());
   const int failures = run.Find(key)->failures;
   run.SetStatus(key, EvaluationStatus::kRunning, failures);
-  ++version_;
+  Changed(key.campaign);
+  WorkersChanged();
   if (run.state() == CampaignState::kQueued) {
     SetState(run, CampaignEvent::kStart, "", nullptr, [](const absl::Status&) {});
   }
@@ -548,6 +556,11 @@ void Scheduler::Tick() {
     }
   }
   workers_.ForgetGone(now - kRemembered);
+  for (auto& [campaign, arrivals] : arrivals_) {
+    if (arrivals.HasCeased(now)) {
+      Changed(campaign);
+    }
+  }
   for (const auto& [campaign, task] : std::exchange(again_, {})) {
     task();
   }
@@ -561,7 +574,7 @@ absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
   }
   worker->draining = true;
   SendDrain(worker->session);
-  ++version_;
+  WorkersChanged();
   for (const v1::WorkerInfo& info : Workers()) {
     if (info.name() == name) {
       return info;

@@ -240,8 +240,10 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                        [finding = *finding](store::Transaction& transaction) {
                          transaction.PutFinding(finding.campaign, finding.record);
                        },
-                       [reactor, caller, of = request->campaign()](const absl::Status& status) {
+                       [this, reactor, caller, of = request->campaign(),
+                        campaign = finding->campaign](const absl::Status& status) {
                          if (status.ok()) {
+                           core_.scheduler().Concluded(campaign);
                            LogChange("finding", of, caller);
                          }
                          reactor->Finish(rpc::ToGrpc(status));

@@ -14,9 +14,9 @@
 #include "server/service/blob_stream.h"
 #include "server/service/calls.h"
 #include "server/service/queries.h"
-#include "server/service/state_pieces.h"
 #include "server/service/stream_reactor.h"
 #include "server/service/watch.h"
+#include "server/service/watch_changes.h"
 
 namespace calib::service {
 namespace {
@@ -168,6 +168,13 @@ grpc::ServerWriteReactor<v1::CampaignStatus>* CampaignsService::Watch(
   });
 }
 
+grpc::ServerWriteReactor<v1::Changes>* CampaignsService::WatchChanges(
+    Context* context, const v1::WatchChangesRequest* request) {
+  return EnterStream<v1::Changes>(context, *request, [this](Entry entry) {
+    return service::WatchChanges(core_, std::move(entry));
+  });
+}
+
 grpc::ServerWriteReactor<v1::Sample>* CampaignsService::GetSamples(
     Context* context, const v1::CampaignRequest* request) {
   return Stream<v1::Sample>(context, *request, SamplesOf);
@@ -177,7 +184,7 @@ grpc::ServerWriteReactor<v1::SampleStates>* CampaignsService::GetStates(
     Context* context, const v1::StatesRequest* request) {
   return EnterStream<v1::SampleStates>(context, *request, [this, request](Entry entry) {
     auto pieces = std::make_shared<StatePieces>(
-        request->campaign(),
+        told_, request->campaign(),
         request->has_sample() ? std::optional<int>(request->sample()) : std::nullopt);
     return new StreamReactor<v1::SampleStates>(
         core_, std::move(entry.pass), &Core::Parse,

@@ -12,6 +12,7 @@
 #include "server/service/core.h"
 #include "server/service/guard.h"
 #include "server/service/requests.h"
+#include "server/service/state_pieces.h"
 #include "server/service/submission.h"
 
 namespace calib::service {
@@ -36,6 +37,8 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   Unary* Show(Context*, const v1::CampaignRequest*, v1::CampaignStatus*) override;
   grpc::ServerWriteReactor<v1::CampaignStatus>* Watch(Context*,
                                                       const v1::CampaignRequest*) override;
+  grpc::ServerWriteReactor<v1::Changes>* WatchChanges(Context*,
+                                                      const v1::WatchChangesRequest*) override;
   Unary* GetPosterior(Context*, const v1::PosteriorRequest*, v1::Posterior*) override;
   grpc::ServerWriteReactor<v1::Sample>* GetSamples(Context*, const v1::CampaignRequest*) override;
   grpc::ServerWriteReactor<v1::SampleStates>* GetStates(Context*,
@@ -97,6 +100,7 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
 
   Core& core_;
   const Site site_;
+  ToldExperiments told_;
   Requests requests_;              // the strand's
   std::atomic<int> read_now_ = 0;  // submissions that are read, or wait to be
 };

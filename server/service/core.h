@@ -73,6 +73,8 @@ class Core final : public scheduler::Ports {
   absl::Status WhyNotStore() const;
   /// Grows whenever something changed that a status shows.
   std::uint64_t version() const { return scheduler_.version() + changes_of_room_; }
+  /// Grows whenever WaitsFor() changed.
+  std::uint64_t changes_of_room() const { return changes_of_room_; }
   /// Write() of what nothing else depends on: RESOURCE_EXHAUSTED, in a sentence, where the disk has
   /// no room for it.
   void WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then);

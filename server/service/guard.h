@@ -37,9 +37,10 @@ class Guard {
  public:
   /// tls: folder of the server's certificate; empty: none. token: what callers without a
   /// certificate must show unless they come over a socket; empty: nothing, for callers of this very
-  /// process. account: whose server it is.
+  /// process. account: whose server it is. inside: what this very process shows to read
+  /// over Server::InProcessChannel(), whatever others must show; empty: nobody does.
   static absl::StatusOr<std::unique_ptr<Guard>> Open(const std::string& tls, std::string token,
-                                                     std::string account);
+                                                     std::string account, std::string inside = "");
 
   /// UNAUTHENTICATED: nothing that is known was shown. PERMISSION_DENIED: the caller's role lacks
   /// the right. Each a sentence, with what would be right.
@@ -53,12 +54,14 @@ class Guard {
                                 const std::string& owner);
 
  private:
-  Guard(std::unique_ptr<access::Verifier> verifier, std::string token, std::string account);
+  Guard(std::unique_ptr<access::Verifier> verifier, std::string token, std::string account,
+        std::string inside);
   absl::StatusOr<Caller> Identify(const grpc::ServerContextBase& context);
 
   const std::unique_ptr<access::Verifier> verifier_;  // nullptr: no certificates
   const std::string token_;
   const std::string account_;
+  const std::string inside_;
   absl::Mutex mutex_;
   std::int64_t judged_unix_s_ ABSL_GUARDED_BY(mutex_) = 0;
   std::set<std::string> good_ ABSL_GUARDED_BY(mutex_);  // certificates, judged in that second

@@ -205,6 +205,7 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   }
   if (live.has_value()) {
     status.set_eta_seconds(live->eta_seconds);
+    status.set_states_per_second(live->states_per_second);
   }
   status.set_model_evaluations(effort.model_evaluations);
   status.set_core_hours(effort.core_seconds / 3600);

@@ -19,7 +19,9 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "proto/rpc/address.h"
+#include "proto/rpc/client_options.h"
 #include "server/access/certificate.h"
+#include "server/access/secret.h"
 #include "server/service/campaigns_service.h"
 #include "server/service/core.h"
 #include "server/service/guard.h"
@@ -127,6 +129,7 @@ struct Server::Impl {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<Listener> listener;  // goes first: it hands connections to the acceptor
   std::string address;
+  std::string inside;  // shown over channels inside this process
 
   /// token: left for programs of this account before anybody is let in; empty: nobody needs one.
   absl::Status Listen(const std::string& listen, const std::string& tls, const std::string& token,
@@ -191,7 +194,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   ASSIGN_OR_RETURN(auto folder, StateFolder::Open(options.state_dir));
   RETURN_IF_ERROR(StartLog(options.log_file));
   ASSIGN_OR_RETURN(const std::string token, folder->Token());
-  ASSIGN_OR_RETURN(auto guard, Guard::Open(options.tls, token, AccountName()));
+  ASSIGN_OR_RETURN(const std::string inside, access::MakeToken());
+  ASSIGN_OR_RETURN(auto guard, Guard::Open(options.tls, token, AccountName(), inside));
   if (options.listen.empty()) {
     ASSIGN_OR_RETURN(options.listen, folder->SocketAddress());
   }
@@ -199,6 +203,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
                    store::Store::Open(folder->DatabasePath(), std::move(options.store_hooks)));
   auto impl = std::make_unique<Impl>();
   impl->folder = std::move(folder);
+  impl->inside = inside;
   impl->core = std::make_unique<Core>(
       std::move(store), std::move(guard),
       scheduler::SchedulerOptions{.lease = options.lease,
@@ -229,6 +234,10 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
 }
 
 int Server::port() const { return impl_->listener->port(); }
+
+std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
+  return rpc::OpenChannelInside(*impl_->grpc, impl_->inside);
+}
 
 std::string Server::address() const { return impl_->address; }
 

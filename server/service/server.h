@@ -11,6 +11,10 @@
 #include "server/service/limits.h"
 #include "server/store/store.h"
 
+namespace grpc {
+class Channel;
+}
+
 namespace calib::service {
 
 struct ServerOptions {
@@ -52,6 +56,9 @@ class Server {
   int port() const;  ///< 0: a socket of a path
   /// HOST:PORT or unix:/PATH for clients on this machine.
   std::string address() const;
+  /// For questions of this very process, which need neither certificate nor token; what changes
+  /// something is refused there. Usable until Shutdown().
+  std::shared_ptr<grpc::Channel> InProcessChannel();
   /// Ends streams with UNAVAILABLE, waits for calls in progress at most this long, closes the
   /// store. Campaigns stay as they are and go on with the next Start().
   void Shutdown(std::chrono::milliseconds deadline);

@@ -14,14 +14,54 @@ namespace {
 
 /// States that are read together at least, where there are as many. Chosen: some hundred KB.
 constexpr std::size_t kStates = 2000;
+/// Campaigns that are known at a time; then all are forgotten.
+constexpr std::size_t kMostKnown = 1000;
+
+absl::StatusOr<std::vector<ToldExperiment>> ReadExperiments(store::Reader& reader,
+                                                            std::int64_t campaign) {
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
+  const campaign::Campaign& read = definition->campaign;
+  std::vector<ToldExperiment> experiments;
+  for (const campaign::Experiment& experiment : read.experiments) {
+    ToldExperiment& told = experiments.emplace_back();
+    told.experiment = experiment.name;
+    if (read.precomputed.has_value()) {
+      for (const campaign::MeasuredObservable& observable : experiment.observables) {
+        told.observables.push_back(observable.name);
+      }
+    } else {
+      told.observables = dem::FindTest(experiment.test)->observables;
+    }
+  }
+  return experiments;
+}
 
 }  // namespace
 
+absl::StatusOr<ToldExperiments::Experiments> ToldExperiments::Of(store::Reader& reader,
+                                                                 std::int64_t campaign) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (const auto known = known_.find(campaign); known != known_.end()) {
+      return known->second;
+    }
+  }
+  ASSIGN_OR_RETURN(auto read, ReadExperiments(reader, campaign));
+  auto experiments = std::make_shared<const std::vector<ToldExperiment>>(std::move(read));
+  absl::MutexLock lock(&mutex_);
+  if (known_.size() >= kMostKnown) {
+    known_.clear();
+  }
+  known_[campaign] = experiments;
+  return experiments;
+}
+
 absl::Status StatePieces::Begin(store::Reader& reader) {
   ASSIGN_OR_RETURN(id_, ParseCampaign(campaign_));
-  ASSIGN_OR_RETURN(const auto record, reader.Campaign(id_));
-  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
-  ASSIGN_OR_RETURN(core_seconds_, reader.CoreSeconds(id_));
+  RETURN_IF_ERROR(reader.Campaign(id_).status());  // it may be known and gone
+  ASSIGN_OR_RETURN(experiments_, told_.Of(reader, id_));
+  ASSIGN_OR_RETURN(core_seconds_, reader.CoreSeconds(id_, sample_));
   ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
   for (const store::SampleRecord& one : samples) {
     if (!sample_.has_value() || *sample_ == one.sample) {
@@ -31,18 +71,6 @@ absl::Status StatePieces::Begin(store::Reader& reader) {
   if (sample_.has_value() && samples_.empty()) {
     return absl::NotFoundError(absl::StrCat("campaign c", id_, " has no sample ", *sample_,
                                             "; see samples for the numbers there are"));
-  }
-  const campaign::Campaign& read = definition->campaign;
-  for (const campaign::Experiment& experiment : read.experiments) {
-    Told& told = experiments_.emplace_back();
-    told.experiment = experiment.name;
-    if (read.precomputed.has_value()) {
-      for (const campaign::MeasuredObservable& observable : experiment.observables) {
-        told.observables.push_back(observable.name);
-      }
-    } else {
-      told.observables = dem::FindTest(experiment.test)->observables;
-    }
   }
   return absl::OkStatus();
 }
@@ -58,7 +86,8 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatePieces::Next(store::Reader& r
     const store::EvaluationKey* last = nullptr;
     for (const store::StateRecord& state : states) {
       if (last == nullptr || *last != state.key) {
-        const Told& told = experiments_[static_cast<std::size_t>(state.key.experiment)];
+        const ToldExperiment& told =
+            (*experiments_)[static_cast<std::size_t>(state.key.experiment)];
         v1::SampleStates& message = messages.emplace_back();
         message.set_sample(state.key.sample);
         message.set_experiment(told.experiment);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -372,7 +373,8 @@ absl::StatusOr<std::map<int, int>> Reader::AttemptsBySample(std::int64_t campaig
   });
 }
 
-absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t campaign) {
+absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(
+    std::int64_t campaign, std::optional<int> sample) {
   return Guard([&] {
     std::map<EvaluationKey, double> seconds;
     SQLite::Statement& row = connection_->Bind(
@@ -384,10 +386,10 @@ absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t
         "(wanted.campaign, wanted.sample, wanted.experiment)) "
         "JOIN attempt ON (attempt.campaign, attempt.sample, attempt.experiment) = "
         "(ran.campaign, ran.sample, ran.experiment) "
-        "WHERE wanted.campaign = ? "
+        "WHERE wanted.campaign = ? AND wanted.sample BETWEEN ? AND ? "
         "GROUP BY wanted.sample, wanted.experiment, ran.campaign, ran.sample, ran.experiment "
         "HAVING spent > 0",
-        campaign);
+        campaign, sample.value_or(0), sample.value_or(std::numeric_limits<int>::max()));
     while (row.executeStep()) {
       seconds[{campaign, row.getColumn(0).getInt(), row.getColumn(1).getInt()}] =
           row.getColumn(2).getDouble();

@@ -64,8 +64,9 @@ class Reader {
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
   /// Core time of all attempts that ended [s], by evaluation; for an evaluation that was reused
   /// that of the equal one that ran, where it is still there. Evaluations of which nothing is known
-  /// are left out.
-  absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(std::int64_t campaign);
+  /// are left out. Of one sample, or of all.
+  absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(
+      std::int64_t campaign, std::optional<int> sample = std::nullopt);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
   /// In the order in which they were last put.

@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < { scheduler report/plot } < { service report/html } < report/documents < client < { diagnosis inspection } < ctl < ctl/verbs < .
+           < { scheduler report/plot } < { service report/html } < report/documents < client < { page diagnosis inspection } < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
@@ -30,13 +30,14 @@ server/messages   | dem proto/calib server/campaign                             
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
 server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
 server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
-server            | proto/rpc server/store server/scheduler server/service                 | spdlog CLI chrono
+server            | proto/rpc server/store server/scheduler server/service server/client server/page | spdlog CLI chrono
 server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
 server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp chrono
 server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono
+server/page       | proto/calib proto/rpc server/access server/messages server/report server/client | openssl nlohmann chrono
 server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann
 server/inspection | dem/registry server/campaign                                          | nlohmann
-server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/diagnosis server/inspection | CLI nlohmann chrono
+server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/page server/diagnosis server/inspection | CLI nlohmann chrono
 """
 WATCHED = 'grpcpp openssl SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 

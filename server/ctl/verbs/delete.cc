@@ -8,10 +8,10 @@
 #include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/lineage.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/messages/read_words.h"
+#include "server/report/views/lineage.h"
 
 namespace calib::ctl {
 namespace {
@@ -32,8 +32,9 @@ absl::Status CheckChildren(const DeleteOptions& options,
     return absl::FailedPreconditionError(absl::StrCat(
         options.campaign, " is not deleted: ", children.size(),
         children.size() == 1 ? " campaign comes" : " campaigns come", " from it (",
-        CountedByPurpose(children), "; `calibctl list` shows them below it); delete them with it: ",
-        "--with-children, or ", options.campaign, " alone: --force"));
+        report::CountedByPurpose(children),
+        "; `calibctl list` shows them below it); delete them with it: ", "--with-children, or ",
+        options.campaign, " alone: --force"));
   }
   std::vector<v1::CampaignStatus> leaving = children;
   std::copy_if(campaigns.begin(), campaigns.end(), std::back_inserter(leaving),
@@ -63,7 +64,7 @@ absl::StatusOr<int> Delete(const CommonOptions& common, const DeleteOptions& opt
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Client& client = session->client();
   ASSIGN_OR_RETURN(const auto campaigns, client.List());
-  const std::vector<v1::CampaignStatus> children = Descendants(campaigns, options.campaign);
+  const std::vector<v1::CampaignStatus> children = report::Descendants(campaigns, options.campaign);
   RETURN_IF_ERROR(CheckChildren(options, campaigns, children));
   std::vector<std::string> leaving = {options.campaign};
   if (options.with_children) {
@@ -82,8 +83,8 @@ absl::StatusOr<int> Delete(const CommonOptions& common, const DeleteOptions& opt
                                     : absl::StrCat(" and ", leaving.size() - 1,
                                                    " that came from it are deleted.\n"));
   if (options.force && !children.empty()) {
-    std::cout << children.size() << " that came from it stay: " << CountedByPurpose(children)
-              << ".\n";
+    std::cout << children.size()
+              << " that came from it stay: " << report::CountedByPurpose(children) << ".\n";
   }
   return kDone;
 }

@@ -43,16 +43,20 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
-          {"posterior.json", messages::RunsRowsOnly(view.status)
-                                 ? report::TablePosteriorJson(view.status)
-                                 : report::PosteriorJson(view.posterior, view.campaign.parameters)},
+          {"posterior.json",
+           messages::RunsRowsOnly(view.status)
+               ? report::TablePosteriorJson(view.status)
+               : report::PosteriorJson(
+                     view.posterior, view.campaign.parameters,
+                     report::ShapeOf(view.posterior, view.campaign.parameters, view.samples))},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},
           {"samples.json", report::SamplesJson(id, names, view.samples)},
           {"samples.csv", report::SamplesCsv(view)},
           {"states.csv", report::StatesCsv(view)},
           {"data.json", report::DataJson(view.campaign)},
           {"fit.csv", report::FitCsv(view, predictions)},
-          {"compare.json", report::ComparisonJson(id, report::Compare(view, predictions))},
+          {"compare.json", report::ComparisonJson(id, report::Compare(view, predictions),
+                                                  report::Curves(view, predictions))},
           {"report.html", report::RenderReport(view)}};
 }
 

@@ -71,7 +71,9 @@ absl::StatusOr<int> Extend(const CommonOptions& common, const ExtendOptions& opt
   ASSIGN_OR_RETURN(const auto view,
                    laboratory.Run(parent, text, "extension of " + options.campaign));
   if (common.json) {
-    std::cout << report::PosteriorJson(view.posterior, view.campaign.parameters);
+    std::cout << report::PosteriorJson(
+        view.posterior, view.campaign.parameters,
+        report::ShapeOf(view.posterior, view.campaign.parameters, view.samples));
     return kDone;
   }
   std::cout << view.campaign.name << ": campaign " << view.status.campaign() << "\n"

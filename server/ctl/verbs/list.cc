@@ -2,23 +2,26 @@
 
 #include <iostream>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "calib/return_if_error.h"
+#include "server/client/documents.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/lineage.h"
+#include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
+#include "server/report/views/lineage.h"
 
 namespace calib::ctl {
 namespace {
 
 // Below its parent the parent's name goes without saying, its purpose does not. A parent that is
 // not above it has been deleted.
-std::string Name(const Branch& branch, const std::map<std::string, std::string>& names) {
+std::string Name(const report::Branch& branch, const std::map<std::string, std::string>& names) {
   const v1::CampaignStatus& s = branch.status;
   if (s.parent().empty()) return s.name();
   if (branch.depth == 0) return s.purpose() + " of " + s.parent() + ", gone: " + s.name();
@@ -30,9 +33,20 @@ std::string Name(const Branch& branch, const std::map<std::string, std::string>&
   return s.purpose().empty() ? own : s.purpose() + ": " + own;
 }
 
-absl::StatusOr<int> List(const CommonOptions& common) {
+struct ListOptions {
+  std::optional<int> limit{};
+  std::string after{};
+};
+
+void Declare(OptionList& list, ListOptions& options) {
+  list.WholeNumber("--limit", options.limit, "at most so many [all]");
+  list.Text("--after", options.after, "ID: those behind this one");
+}
+
+absl::StatusOr<int> List(const CommonOptions& common, const ListOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
-  ASSIGN_OR_RETURN(const auto campaigns, session->client().List());
+  ASSIGN_OR_RETURN(const auto campaigns, client::List(session->client(), {.limit = options.limit,
+                                                                          .after = options.after}));
   if (common.json) {
     std::cout << report::StatusListJson(campaigns);
     return kDone;
@@ -41,7 +55,7 @@ absl::StatusOr<int> List(const CommonOptions& common) {
       {"<id", "<name", "<state", "iteration", "samples", "evaluations", "core hours", "misfit"});
   std::map<std::string, std::string> names;
   for (const v1::CampaignStatus& s : campaigns) names[s.campaign()] = s.name();
-  for (const Branch& branch : AsTree(campaigns)) {
+  for (const report::Branch& branch : report::AsTree(campaigns)) {
     const v1::CampaignStatus& s = branch.status;
     table.AddRow({std::string(static_cast<std::size_t>(2 * branch.depth), ' ') + s.campaign(),
                   Name(branch, names), s.state(),
@@ -66,8 +80,8 @@ absl::StatusOr<int> List(const CommonOptions& common) {
 }  // namespace
 
 Verb ListVerb() {
-  return {.help = {.name = "list", .description = "All campaigns", .example = "list"},
-          .run = &List};
+  return MakeVerb<ListOptions>({.name = "list", .description = "All campaigns", .example = "list"},
+                               &Declare, &List);
 }
 
 }  // namespace calib::ctl

@@ -3,13 +3,12 @@
 #include <string>
 
 #include "calib/return_if_error.h"
-#include "server/client/load_view.h"
+#include "server/client/documents.h"
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
-#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
@@ -27,16 +26,16 @@ void Declare(OptionList& list, PosteriorOptions& options) {
 
 absl::StatusOr<int> Posterior(const CommonOptions& common, const PosteriorOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  if (common.json) {
+    ASSIGN_OR_RETURN(
+        const auto document,
+        client::PosteriorDocument(session->client(), options.campaign, options.iteration));
+    std::cout << document;
+    return kDone;
+  }
   ASSIGN_OR_RETURN(const auto posterior,
                    session->client().GetPosterior(options.campaign, options.iteration));
-  if (common.json) {
-    ASSIGN_OR_RETURN(const auto source, session->client().GetSource(options.campaign));
-    ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(session->client(), source));
-    std::cout << report::PosteriorJson(posterior, campaign.parameters);
-  } else {
-    std::cout << PosteriorText(posterior,
-                               {posterior.warnings().begin(), posterior.warnings().end()});
-  }
+  std::cout << PosteriorText(posterior, {posterior.warnings().begin(), posterior.warnings().end()});
   return kDone;
 }
 

@@ -15,6 +15,7 @@
 #include "server/client/standstill_notice.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/live_page.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/verb.h"
@@ -31,6 +32,7 @@ namespace {
 struct RunOptions {
   std::string file;
   std::optional<std::uint64_t> seed{};
+  std::optional<std::string> http{};  ///< the live page is served, here; empty: at the usual place
 };
 
 constexpr const char* kDefaultState = "calib-state";
@@ -46,7 +48,8 @@ absl::Status ResumeIfPaused(client::Client& client, const std::string& campaign)
 
 // Shows progress until the campaign is over, pauses by itself (too many failures) or the user
 // interrupts.
-absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::string& campaign) {
+absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::string& campaign,
+                                          LivePage* page) {
   client::ProgressLine line;
   client::StandstillNotice notice(session);
   for (;;) {
@@ -64,6 +67,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::s
       return status;
     notice.Look(*status);
     RETURN_IF_ERROR(session.Check());
+    if (page != nullptr) page->Follow(session);
     std::this_thread::sleep_for(kPollCampaign);
   }
 }
@@ -75,7 +79,9 @@ absl::StatusOr<int> PrintAnswer(client::Session& session, const std::string& cam
     return kDone;
   }
   if (json) {
-    std::cout << report::PosteriorJson(view.posterior, view.campaign.parameters);
+    std::cout << report::PosteriorJson(
+        view.posterior, view.campaign.parameters,
+        report::ShapeOf(view.posterior, view.campaign.parameters, view.samples));
     return kDone;
   }
   const report::Comparison comparison = report::Compare(view, report::PredictReadings(view));
@@ -88,6 +94,9 @@ absl::StatusOr<int> PrintAnswer(client::Session& session, const std::string& cam
 void Declare(OptionList& list, RunOptions& options) {
   list.CampaignFile(options.file);
   list.Seed(options.seed);
+  list.OptionalText("--http", options.http,
+                    std::string("serves the live page while it runs; HOST:PORT of this machine [") +
+                        page::kUsualAddress + ", or a free port where that is taken]");
 }
 
 absl::StatusOr<int> Run(const CommonOptions& common, const RunOptions& options) {
@@ -102,6 +111,16 @@ absl::StatusOr<int> Run(const CommonOptions& common, const RunOptions& options) 
   if (!source) return kBadInput;
   client::CatchInterrupts();
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(embedded, /*may_create=*/true));
+  std::optional<LivePage> page;
+  if (options.http) {
+    auto served = LivePage::Serve(*session, *options.http, embedded.state);
+    if (served.ok()) {
+      page = *std::move(served);
+      std::cerr << "page: " << page->url() << "\n";
+    } else {  // the campaign does not depend on it
+      std::cerr << "no page: " << served.status().message() << "\n";
+    }
+  }
   ASSIGN_OR_RETURN(const auto campaign,
                    SubmitSource(session->client(), *source, options.seed, options.file));
   RETURN_IF_ERROR(ResumeIfPaused(session->client(), campaign));
@@ -113,7 +132,7 @@ absl::StatusOr<int> Run(const CommonOptions& common, const RunOptions& options) 
     }
     std::cerr << "campaign " << campaign << " in " << embedded.state << " with "
               << session->workers() << " worker(s)\n";
-    ASSIGN_OR_RETURN(status, Follow(*session, campaign));
+    ASSIGN_OR_RETURN(status, Follow(*session, campaign, page ? &*page : nullptr));
   }
   if (messages::StateOf(status) == CampaignState::kFinished)
     return PrintAnswer(*session, campaign, common.json);

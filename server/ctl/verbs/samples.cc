@@ -2,12 +2,12 @@
 #include <string>
 
 #include "calib/return_if_error.h"
+#include "server/client/documents.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
-#include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
@@ -23,18 +23,17 @@ void Declare(OptionList& list, SamplesOptions& options) { list.Campaign(options.
 absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Client& client = session->client();
+  if (common.json) {
+    ASSIGN_OR_RETURN(const auto document, client::SamplesDocument(client, options.campaign));
+    std::cout << document;
+    return kDone;
+  }
   ASSIGN_OR_RETURN(const auto samples, client.GetSamples(options.campaign));
   ASSIGN_OR_RETURN(const auto source, client.GetSource(options.campaign));
   ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(client, source));
-  std::vector<std::string> names;
   std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
-    names.push_back(parameter.name);
     columns.push_back(parameter.name);
-  }
-  if (common.json) {
-    std::cout << report::SamplesJson(options.campaign, names, samples);
-    return kDone;
   }
   report::TextTable table(columns);
   for (const v1::Sample& s : samples) {

@@ -6,15 +6,15 @@
 #include <string>
 
 #include "calib/return_if_error.h"
+#include "server/client/documents.h"
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/lineage.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/messages/read_words.h"
-#include "server/report/documents/json_documents.h"
 #include "server/report/text/text_table.h"
+#include "server/report/views/lineage.h"
 
 namespace calib::ctl {
 namespace {
@@ -47,7 +47,7 @@ std::string Family(const v1::CampaignStatus& status,
                         status.purpose().empty() ? "a derived campaign" : status.purpose());
   }
   std::vector<v1::CampaignStatus> trials;
-  for (const v1::CampaignStatus& child : ChildrenOf(campaigns, status.campaign())) {
+  for (const v1::CampaignStatus& child : report::ChildrenOf(campaigns, status.campaign())) {
     if (messages::PurposeOf(child) != campaign::DerivedFor::kExtension) {
       trials.push_back(child);
       continue;
@@ -56,7 +56,7 @@ std::string Family(const v1::CampaignStatus& status,
                         child.campaign(), child.state());
   }
   if (!trials.empty()) {
-    text += fmt::format("Made from it: {} ({} to {}).\n", CountedByPurpose(trials),
+    text += fmt::format("Made from it: {} ({} to {}).\n", report::CountedByPurpose(trials),
                         trials.front().campaign(), trials.back().campaign());
   }
   return text;
@@ -71,29 +71,20 @@ std::string Concluded(const std::vector<v1::Finding>& findings) {
   return text;
 }
 
-// Of the last complete iteration; none before there is one.
-absl::StatusOr<std::vector<std::string>> WarningsOf(client::Client& client,
-                                                    const std::string& campaign) {
-  const auto posterior = client.GetPosterior(campaign, std::nullopt);
-  if (absl::IsFailedPrecondition(posterior.status())) return std::vector<std::string>();
-  RETURN_IF_ERROR(posterior.status());
-  return std::vector<std::string>(posterior->warnings().begin(), posterior->warnings().end());
-}
-
 void Declare(OptionList& list, ShowOptions& options) { list.Campaign(options.campaign); }
 
 absl::StatusOr<int> Show(const CommonOptions& common, const ShowOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Client& client = session->client();
+  if (common.json) {
+    ASSIGN_OR_RETURN(const auto document, client::ShowDocument(client, options.campaign));
+    std::cout << document;
+    return kDone;
+  }
   ASSIGN_OR_RETURN(const auto status, client.Show(options.campaign));
   ASSIGN_OR_RETURN(const auto campaigns, client.List());
   ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
-  ASSIGN_OR_RETURN(const auto warnings, WarningsOf(client, options.campaign));
-  if (common.json) {
-    std::cout << report::ShownJson(status, ChildrenOf(campaigns, options.campaign), findings,
-                                   warnings);
-    return kDone;
-  }
+  ASSIGN_OR_RETURN(const auto warnings, client::WarningsOf(client, options.campaign));
   std::cout << StatusText(status);
   for (const std::string& warning : warnings) std::cout << report::Wrapped(warning, "! ", "  ");
   std::cout << Family(status, campaigns) << Concluded(findings);

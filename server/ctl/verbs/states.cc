@@ -3,12 +3,12 @@
 
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
+#include "server/client/documents.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
-#include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
@@ -44,14 +44,16 @@ void Declare(OptionList& list, StatesOptions& options) {
 
 absl::StatusOr<int> States(const CommonOptions& common, const StatesOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  if (common.json) {
+    ASSIGN_OR_RETURN(const auto document,
+                     client::StatesDocument(session->client(), options.campaign, options.sample));
+    std::cout << document;
+    return kDone;
+  }
   ASSIGN_OR_RETURN(const auto states,
                    client::LoadStates(session->client(), options.campaign, options.sample));
   std::map<std::string, report::StateHistory> by_experiment;
   for (const auto& [key, history] : states) by_experiment[key.first] = history;
-  if (common.json) {
-    std::cout << report::StatesJson(options.campaign, options.sample, by_experiment);
-    return kDone;
-  }
   if (by_experiment.empty()) std::cout << "Sample " << options.sample << " has no states yet.\n";
   for (const auto& [experiment, history] : by_experiment) Print(experiment, history);
   return kDone;

@@ -1,10 +1,12 @@
 #include "server/report/documents/json_documents.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "server/campaign/file/text/data_file.h"
+#include "server/messages/read_words.h"
 
 namespace calib::report {
 namespace {
@@ -46,6 +48,7 @@ Json Status(const v1::CampaignStatus& s) {
           {"samples_diverged", s.samples_diverged()},
           {"effective_sample_size", PositiveOrNull(s.effective_sample_size())},
           {"best_misfit", PositiveOrNull(s.best_misfit())},
+          {"states_per_second", messages::IsOver(s) ? Json(nullptr) : Json(s.states_per_second())},
           {"eta_seconds", s.eta_seconds() < 0 ? Json(nullptr) : Json(s.eta_seconds())},
           {"model_evaluations", s.model_evaluations()},
           {"core_hours", s.core_hours()},
@@ -112,8 +115,16 @@ Json Drift(const ParameterDrift& d) {
   return json;
 }
 
+Json Pairs(const DensityCurve& curve) {
+  if (curve.empty()) return nullptr;
+  Json pairs = Json::array();
+  for (const auto& [x, p] : curve) pairs.push_back({x, p});
+  return pairs;
+}
+
 Json PosteriorFields(const v1::Posterior& p,
-                     std::span<const campaign::CalibratedParameter> campaign_parameters) {
+                     std::span<const campaign::CalibratedParameter> campaign_parameters,
+                     const PosteriorShape& shape) {
   Json parameters = Json::object();
   const auto bound = [&](const std::string& name, double inference::Prior::*end,
                          double shown) -> Json {
@@ -134,7 +145,14 @@ Json PosteriorFields(const v1::Posterior& p,
                             {"prior_min", bound(q.name(), &inference::Prior::min, q.prior_min())},
                             {"prior_max", bound(q.name(), &inference::Prior::max, q.prior_max())},
                             {"conditioned_on", q.conditioned_on()},
-                            {"split_half", q.split_half()}};
+                            {"split_half", q.split_half()},
+                            {"prior_density", nullptr},
+                            {"density", nullptr}};
+  }
+  for (std::size_t j = 0; j < shape.parameters.size(); ++j) {
+    Json& parameter = parameters[shape.parameters[j]];
+    parameter["prior_density"] = Pairs(shape.prior[j]);
+    parameter["density"] = Pairs(shape.density[j]);
   }
   Json noise_scale = Json::array();
   for (const auto& scale : p.noise_scale()) {
@@ -178,18 +196,22 @@ Json PosteriorFields(const v1::Posterior& p,
           {"audited_bound", p.has_audited_bound() ? Json(p.audited_bound()) : Json(nullptr)},
           {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
           {"core_hours", p.core_hours()},
+          {"draws", shape.draws.empty()
+                        ? Json(nullptr)
+                        : Json({{"parameters", shape.parameters}, {"values", shape.draws}})},
           {"warnings", warnings}};
 }
 
 }  // namespace
 
 std::string PosteriorJson(const v1::Posterior& posterior,
-                          std::span<const campaign::CalibratedParameter> parameters) {
-  return Dump(PosteriorFields(posterior, parameters));
+                          std::span<const campaign::CalibratedParameter> parameters,
+                          const PosteriorShape& shape) {
+  return Dump(PosteriorFields(posterior, parameters, shape));
 }
 
 std::string TablePosteriorJson(const v1::CampaignStatus& status) {
-  Json json = PosteriorFields({}, {});
+  Json json = PosteriorFields({}, {}, {});
   for (auto& [name, value] : json.items()) {
     if (value.is_primitive()) value = nullptr;
   }
@@ -242,7 +264,67 @@ std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {
                {"warnings", s.warnings}});
 }
 
-std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
+namespace {
+
+Json CurvesOf(const ObservableCurves& o) {
+  Json bands = nullptr;
+  if (std::any_of(o.prediction.mean.begin(), o.prediction.mean.end(),
+                  [](double mean) { return std::isfinite(mean); })) {
+    const auto& [q025, q25, q50, q75, q975] = o.prediction.bands;
+    bands = {{"mean", Numbers(o.prediction.mean)},
+             {"q025", Numbers(q025)},
+             {"q05", Numbers(o.prediction.q05)},
+             {"q25", Numbers(q25)},
+             {"q50", Numbers(q50)},
+             {"q75", Numbers(q75)},
+             {"q95", Numbers(o.prediction.q95)},
+             {"q975", Numbers(q975)}};
+  }
+  Json runs = Json::array();
+  for (const std::vector<double>& run : o.runs) runs.push_back(Numbers(run));
+  return {{"name", o.name},
+          {"unit", o.unit},
+          {"values", Numbers(o.values)},
+          {"sd", Numbers(o.sd)},
+          {"total_sd", Numbers(o.total_sd)},
+          {"bands", bands},
+          {"residual", Numbers(o.residual)},
+          {"runs", runs}};
+}
+
+Json CurvesOf(const ExperimentCurves& e) {
+  Json settings = Json::object();
+  for (const auto& [name, setting] : e.settings) {
+    settings[name] = {{"value", setting.value}, {"unit", setting.unit}};
+  }
+  Json runs = Json::array();
+  for (const DrawnRun& run : e.runs) {
+    runs.push_back({{"sample", run.sample},
+                    {"rank", run.rank ? Json(*run.rank) : Json(nullptr)},
+                    {"status", run.status},
+                    {"weight", run.weight},
+                    {"log_likelihood", run.log_likelihood}});
+  }
+  Json observables = Json::array();
+  for (const ObservableCurves& o : e.observables) observables.push_back(CurvesOf(o));
+  return {{"experiment", e.experiment},
+          {"test", e.test},
+          {"role", e.heldout ? "validate" : "calibrate"},
+          {"settings", settings},
+          {"control", e.control},
+          {"control_unit", e.control_unit},
+          {"control_values", Numbers(e.control_values)},
+          {"segments", e.segments},
+          {"runs", runs},
+          {"observables", observables}};
+}
+
+}  // namespace
+
+std::string ComparisonJson(const std::string& campaign, const Comparison& c,
+                           const std::vector<ExperimentCurves>& curves) {
+  Json experiments = Json::array();
+  for (const ExperimentCurves& e : curves) experiments.push_back(CurvesOf(e));
   Json by_observable = Json::array();
   for (const ObservableMisfit& m : c.by_observable) {
     by_observable.push_back({{"experiment", m.experiment},
@@ -329,6 +411,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"discrepancy", discrepancy},
                {"prior_conflicts", conflicts},
                {"at_bound", c.at_bound},
+               {"experiments", experiments},
                {"warnings", c.warnings},
                {"note", c.note}});
 }
@@ -354,25 +437,23 @@ std::string ModelsJson(const ModelComparison& comparison) {
 
 std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(status)); }
 
-std::string ShownJson(const v1::CampaignStatus& status,
-                      const std::vector<v1::CampaignStatus>& children,
-                      const std::vector<v1::Finding>& findings,
-                      const std::vector<std::string>& warnings) {
-  Json json = Status(status);
-  json["warnings"] = warnings;
+std::string ShownJson(const Shown& shown) {
+  Json json = Status(shown.status);
+  json["warnings"] = shown.warnings;
   json["children"] = Json::array();
-  for (const v1::CampaignStatus& child : children) {
+  for (const v1::CampaignStatus& child : shown.children) {
     json["children"].push_back({{"campaign", child.campaign()},
                                 {"purpose", child.purpose()},
                                 {"name", child.name()},
                                 {"state", child.state()}});
   }
   json["findings"] = Json::array();
-  for (const v1::Finding& finding : findings) {
+  for (const v1::Finding& finding : shown.findings) {
     json["findings"].push_back({{"kind", finding.kind()},
                                 {"digest", finding.digest()},
                                 {"created_unix_ms", finding.created_unix_ms()}});
   }
+  json["next_command"] = shown.next_command.empty() ? Json(nullptr) : Json(shown.next_command);
   return Dump(json);
 }
 
@@ -380,6 +461,21 @@ std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses) {
   Json list = Json::array();
   for (const v1::CampaignStatus& status : statuses) list.push_back(Status(status));
   return Dump(list);
+}
+
+std::string LineageJson(const std::string& campaign, const std::vector<Branch>& family) {
+  Json nodes = Json::array();
+  for (const Branch& branch : family) {
+    const v1::CampaignStatus& s = branch.status;
+    nodes.push_back({{"campaign", s.campaign()},
+                     {"name", s.name()},
+                     {"state", s.state()},
+                     {"parent", s.parent().empty() ? Json(nullptr) : Json(s.parent())},
+                     {"purpose", s.purpose().empty() ? Json(nullptr) : Json(s.purpose())},
+                     {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())},
+                     {"depth", branch.depth}});
+  }
+  return Dump({{"campaign", campaign}, {"nodes", nodes}});
 }
 
 std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,

@@ -12,27 +12,40 @@
 #include "server/campaign/model/campaign.h"
 #include "server/report/views/campaign_view.h"
 #include "server/report/views/comparison.h"
+#include "server/report/views/curves.h"
+#include "server/report/views/lineage.h"
 #include "server/report/views/model_comparison.h"
+#include "server/report/views/posterior_shape.h"
 #include "server/report/views/sensitivity.h"
 
 namespace calib::report {
 
-/// parameters: of the campaign; where given, bounds that a prior does not have are null.
+/// parameters: of the campaign; where given, bounds that a prior does not have are null. shape: of
+/// the posterior; without it there are no draws and densities.
 std::string PosteriorJson(const v1::Posterior& posterior,
-                          std::span<const campaign::CalibratedParameter> parameters = {});
+                          std::span<const campaign::CalibratedParameter> parameters = {},
+                          const PosteriorShape& shape = {});
 /// The fields of PosteriorJson() for a table that has run: what it has cost, everything else null
 /// or empty.
 std::string TablePosteriorJson(const v1::CampaignStatus& status);
-std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
+std::string ComparisonJson(const std::string& campaign, const Comparison& comparison,
+                           const std::vector<ExperimentCurves>& curves = {});
 std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);
 std::string ModelsJson(const ModelComparison& comparison);
 std::string StatusJson(const v1::CampaignStatus& status);
-/// With what comes from it directly, what was concluded about it and the warnings of its posterior.
-std::string ShownJson(const v1::CampaignStatus& status,
-                      const std::vector<v1::CampaignStatus>& children,
-                      const std::vector<v1::Finding>& findings,
-                      const std::vector<std::string>& warnings);
+/// A campaign with what comes from it directly, what was concluded about it, the warnings of its
+/// posterior and the command to go on with (NextCommand).
+struct Shown {
+  v1::CampaignStatus status{};
+  std::vector<v1::CampaignStatus> children{};
+  std::vector<v1::Finding> findings{};
+  std::vector<std::string> warnings{};
+  std::string next_command{};
+};
+std::string ShownJson(const Shown& shown);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
+/// family: of the campaign, with the depth of each.
+std::string LineageJson(const std::string& campaign, const std::vector<Branch>& family);
 /// parameters: names in the order of each sample's values.
 std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
                         const std::vector<v1::Sample>& samples);

@@ -11,6 +11,12 @@ namespace {
 
 constexpr double kFewestRuns = 2;  // effective, of a covariance
 
+// Ascending: what WeightedQuantiles is asked for, and where those of kBandProbabilities stand.
+constexpr std::array kQuantiles = {0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975};
+constexpr std::size_t kAt05 = 1;
+constexpr std::size_t kAt95 = 5;
+constexpr std::array<std::size_t, kBandProbabilities.size()> kBandsAt = {0, 2, 3, 4, 6};
+
 // [observable][reading][sample of positive weight]
 using Ensemble = std::vector<std::vector<std::vector<double>>>;
 
@@ -106,8 +112,14 @@ ExperimentPrediction FromRuns(const CampaignView& view, const campaign::Experime
     ObservablePrediction out;
     for (const std::vector<double>& values : observable) {
       out.mean.push_back(WeightedMean(values, counted.weights));
-      out.q05.push_back(band ? WeightedQuantile(values, counted.weights, 0.05) : std::nan(""));
-      out.q95.push_back(band ? WeightedQuantile(values, counted.weights, 0.95) : std::nan(""));
+      const std::vector<double> quantiles =
+          band ? WeightedQuantiles(values, counted.weights, kQuantiles)
+               : std::vector<double>(kQuantiles.size(), std::nan(""));
+      out.q05.push_back(quantiles[kAt05]);
+      out.q95.push_back(quantiles[kAt95]);
+      for (std::size_t k = 0; k < kBandsAt.size(); ++k) {
+        out.bands[k].push_back(quantiles[kBandsAt[k]]);
+      }
     }
     if (band && experiment.role == campaign::Role::kValidate) {
       SpreadOf(observable, counted.weights, out);
@@ -125,6 +137,7 @@ ExperimentPrediction FromBands(const v1::Posterior& posterior,
     const std::vector<double> none(experiment.control.size(), std::nan(""));
     ObservablePrediction& out = prediction.observables.emplace_back(
         ObservablePrediction{.mean = none, .q05 = none, .q95 = none});
+    out.bands.fill(none);
     for (const v1::Posterior::Band& band : posterior.bands()) {
       if (band.experiment() != experiment.name || band.observable() != observable.name) continue;
       for (int i = 0; i < band.load_step_size(); ++i) {
@@ -133,6 +146,11 @@ ExperimentPrediction FromBands(const v1::Posterior& posterior,
         out.mean[step] = band.mean(i);
         out.q05[step] = band.q05(i);
         out.q95[step] = band.q95(i);
+        const google::protobuf::RepeatedField<double>* const quantiles[] = {
+            &band.q025(), &band.q25(), &band.q50(), &band.q75(), &band.q975()};
+        for (std::size_t k = 0; k < out.bands.size(); ++k) {
+          if (i < quantiles[k]->size()) out.bands[k][step] = quantiles[k]->Get(i);
+        }
       }
     }
   }

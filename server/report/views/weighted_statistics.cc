@@ -24,6 +24,12 @@ double WeightedMean(std::span<const double> values, std::span<const double> weig
 
 double WeightedQuantile(std::span<const double> values, std::span<const double> weights,
                         double probability) {
+  return WeightedQuantiles(values, weights, std::span(&probability, 1)).front();
+}
+
+std::vector<double> WeightedQuantiles(std::span<const double> values,
+                                      std::span<const double> weights,
+                                      std::span<const double> probabilities) {
   std::vector<std::pair<double, double>> sorted;
   double total = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -32,12 +38,17 @@ double WeightedQuantile(std::span<const double> values, std::span<const double> 
     total += weights[i];
   }
   std::sort(sorted.begin(), sorted.end());
+  std::vector<double> quantiles;
   double below = 0;
   for (const auto& [value, weight] : sorted) {
     below += weight;
-    if (below >= probability * total) return value;
+    while (quantiles.size() < probabilities.size() &&
+           below >= probabilities[quantiles.size()] * total) {
+      quantiles.push_back(value);
+    }
   }
-  return sorted.empty() ? std::nan("") : sorted.back().first;
+  quantiles.resize(probabilities.size(), sorted.empty() ? std::nan("") : sorted.back().first);
+  return quantiles;
 }
 
 std::vector<double> WeightedHistogram(std::span<const double> values,

@@ -14,6 +14,11 @@ double WeightedMean(std::span<const double> values, std::span<const double> weig
 double WeightedQuantile(std::span<const double> values, std::span<const double> weights,
                         double probability);
 
+/// The same of several probabilities, ascending.
+std::vector<double> WeightedQuantiles(std::span<const double> values,
+                                      std::span<const double> weights,
+                                      std::span<const double> probabilities);
+
 /// Share of the weight in each of `bins` equal intervals of [min, max], as a density (integrates to
 /// one over the range).
 std::vector<double> WeightedHistogram(std::span<const double> values,

@@ -135,7 +135,8 @@ TEST_F(Answers, AServerStartsOnNumbersThatAreNone) {
 
 TEST_F(Answers, StatesComeInPiecesAndAllOfThem) {
   AddCampaign(1, Posterior(2));
-  StatePieces pieces("c1", std::nullopt);
+  ToldExperiments told;
+  StatePieces pieces(told, "c1", std::nullopt);
   std::vector<v1::SampleStates> all;
   for (int k = 0; k < 10; ++k) {
     store::Reader reader = Read();
@@ -151,10 +152,10 @@ TEST_F(Answers, StatesComeInPiecesAndAllOfThem) {
   EXPECT_EQ(all[1].states(1).values(0), 1);
   EXPECT_EQ(all[1].states(1).load_step(), 1);
   store::Reader reader = Read();
-  EXPECT_EQ(StatePieces("c1", 7).Next(reader).status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(StatePieces("c9", std::nullopt).Next(reader).status().code(),
+  EXPECT_EQ(StatePieces(told, "c1", 7).Next(reader).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(StatePieces(told, "c9", std::nullopt).Next(reader).status().code(),
             absl::StatusCode::kNotFound);
-  StatePieces second("c1", 1);
+  StatePieces second(told, "c1", 1);
   EXPECT_EQ(second.Next(reader)->size(), 1U);
   EXPECT_TRUE(second.Next(reader)->empty());
 }

@@ -6,7 +6,7 @@
 
 #include "calib/v1/campaign.pb.h"
 
-namespace calib::ctl {
+namespace calib::report {
 
 /// A campaign in the tree of who comes from whom.
 struct Branch {
@@ -27,7 +27,12 @@ std::vector<v1::CampaignStatus> Descendants(const std::vector<v1::CampaignStatus
 std::vector<v1::CampaignStatus> ChildrenOf(const std::vector<v1::CampaignStatus>& campaigns,
                                            const std::string& campaign);
 
+/// The whole family of a campaign: the first that it comes from and all that come from that, depth
+/// from there; empty: there is no such campaign.
+std::vector<Branch> FamilyOf(const std::vector<v1::CampaignStatus>& campaigns,
+                             const std::string& campaign);
+
 /// "2 screen, 1 extension": how many of each purpose, in the order of their first.
 std::string CountedByPurpose(const std::vector<v1::CampaignStatus>& campaigns);
 
-}  // namespace calib::ctl
+}  // namespace calib::report

@@ -1,8 +1,8 @@
-#include "server/ctl/lineage.h"
+#include "server/report/views/lineage.h"
 
 #include <gtest/gtest.h>
 
-namespace calib::ctl {
+namespace calib::report {
 namespace {
 
 v1::CampaignStatus Make(const std::string& id, const std::string& parent,
@@ -49,5 +49,17 @@ TEST(Lineage, KnowsChildrenAndAllThatComesFromACampaign) {
   EXPECT_EQ(CountedByPurpose(Descendants(Campaigns(), "c1")), "3 screen, 1 extension, 1 warm_fit");
 }
 
+TEST(Lineage, AFamilyIsTheSameForEachOfItsMembers) {
+  for (const char* member : {"c1", "c4", "c10"}) {
+    std::string ids;
+    for (const Branch& branch : FamilyOf(Campaigns(), member)) {
+      ids += branch.status.campaign() + ":" + std::to_string(branch.depth) + " ";
+    }
+    EXPECT_EQ(ids, "c1:0 c2:1 c4:1 c5:2 c10:3 c8:1 ") << member;
+  }
+  EXPECT_EQ(FamilyOf(Campaigns(), "c3").size(), 1U);
+  EXPECT_TRUE(FamilyOf(Campaigns(), "c99").empty());
+}
+
 }  // namespace
-}  // namespace calib::ctl
+}  // namespace calib::report

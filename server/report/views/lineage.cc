@@ -1,4 +1,4 @@
-#include "server/ctl/lineage.h"
+#include "server/report/views/lineage.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,12 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 
-namespace calib::ctl {
+namespace calib::report {
 namespace {
 
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+constexpr std::size_t kNoParent = static_cast<std::size_t>(-1);
 
-using Children = std::map<std::size_t, std::vector<std::size_t>>;  // by parent; kNone: roots
+using Children = std::map<std::size_t, std::vector<std::size_t>>;  // by parent; kNoParent: roots
 
 void AddBranch(const std::vector<v1::CampaignStatus>& campaigns, const Children& children,
                std::size_t parent, int depth, std::vector<Branch>& tree) {
@@ -31,11 +31,11 @@ std::vector<Branch> AsTree(const std::vector<v1::CampaignStatus>& campaigns) {
   Children children;
   for (std::size_t k = 0; k < campaigns.size(); ++k) {
     const auto parent = earlier.find(campaigns[k].parent());
-    children[parent == earlier.end() ? kNone : parent->second].push_back(k);
+    children[parent == earlier.end() ? kNoParent : parent->second].push_back(k);
     earlier[campaigns[k].campaign()] = k;
   }
   std::vector<Branch> tree;
-  AddBranch(campaigns, children, kNone, 0, tree);
+  AddBranch(campaigns, children, kNoParent, 0, tree);
   return tree;
 }
 
@@ -63,6 +63,21 @@ std::vector<v1::CampaignStatus> ChildrenOf(const std::vector<v1::CampaignStatus>
   return children;
 }
 
+std::vector<Branch> FamilyOf(const std::vector<v1::CampaignStatus>& campaigns,
+                             const std::string& campaign) {
+  std::vector<Branch> family;
+  bool is_own = false;
+  for (Branch& branch : AsTree(campaigns)) {
+    if (branch.depth == 0) {
+      if (is_own) break;
+      family.clear();
+    }
+    is_own = is_own || branch.status.campaign() == campaign;
+    family.push_back(std::move(branch));
+  }
+  return is_own ? family : std::vector<Branch>();
+}
+
 std::string CountedByPurpose(const std::vector<v1::CampaignStatus>& campaigns) {
   std::vector<std::pair<std::string, int>> counts;
   for (const v1::CampaignStatus& c : campaigns) {
@@ -82,4 +97,4 @@ std::string CountedByPurpose(const std::vector<v1::CampaignStatus>& campaigns) {
   return text;
 }
 
-}  // namespace calib::ctl
+}  // namespace calib::report
