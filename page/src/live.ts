@@ -1,0 +1,102 @@
+// The server's events: what has changed, never what it is now. The stream is opened again by our own clock, so that the page can
+// say when.
+
+import type { Answers } from "./answers.ts";
+
+export type Connection =
+  | { state: "connecting" }
+  | { state: "open" }
+  | { state: "server_away" } // the page's server answers; the one behind it does not
+  | { state: "lost"; retryInS: number };
+
+const kFirstRetryS = 1;
+const kLastRetryS = 15;
+
+interface CampaignEvent {
+  campaign: string;
+  concluded?: number;
+}
+
+// What follows from the samples of whole iterations, and from what was concluded about them.
+const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
+// Of a campaign that has no conclusion yet these still grow with its runs, but no eye needs them faster.
+const kGrowing = 3000; // ms
+
+export class Live {
+  private retryS = kFirstRetryS;
+  private wasOpen = false;
+  private readonly concluded = new Map<string, number>();
+  private readonly lastGrowth = new Map<string, number>();
+
+  constructor(
+    private readonly answers: Answers,
+    private readonly tell: (connection: Connection) => void,
+  ) {}
+
+  start(): void {
+    this.tell({ state: "connecting" });
+    const source = new EventSource("api/v1/events");
+    source.onopen = () => {
+      this.retryS = kFirstRetryS;
+      this.tell({ state: "open" });
+      if (this.wasOpen) this.answers.mark(() => true); // whatever happened in between
+      this.wasOpen = true;
+    };
+    source.onerror = () => {
+      source.close();
+      this.countDown(this.retryS);
+      this.retryS = Math.min(2 * this.retryS, kLastRetryS);
+    };
+    source.addEventListener("campaign", (event) => this.onCampaign(parse(event) as CampaignEvent));
+    source.addEventListener("campaigns", () => this.answers.mark((path) => path === "campaigns" || path.endsWith("/lineage")));
+    source.addEventListener("workers", () => this.answers.mark((path) => path === "workers"));
+    for (const name of ["hello", "server"]) {
+      source.addEventListener(name, (event) => {
+        const { up } = parse(event) as { up?: boolean };
+        this.tell({ state: up === false ? "server_away" : "open" });
+        if (name === "server" && up === true) this.answers.mark(() => true);
+      });
+    }
+  }
+
+  private countDown(seconds: number): void {
+    if (seconds <= 0) {
+      this.start();
+      return;
+    }
+    this.tell({ state: "lost", retryInS: seconds });
+    setTimeout(() => this.countDown(seconds - 1), 1000);
+  }
+
+  private onCampaign(event: CampaignEvent): void {
+    const id = event.campaign;
+    if (typeof id !== "string") return;
+    const concluded = event.concluded ?? 0;
+    const isNew = this.concluded.get(id) !== concluded;
+    this.concluded.set(id, concluded);
+    const now = performance.now();
+    const grows = now - (this.lastGrowth.get(id) ?? -Infinity) >= kGrowing;
+    if (grows) this.lastGrowth.set(id, now);
+    this.answers.mark((path, answer) => {
+      if (path === "campaigns") return true;
+      if (path === `campaigns/${id}`) return true;
+      if (!path.startsWith(`campaigns/${id}/`)) return false;
+      const [last = ""] = (path.split("/")[2] ?? "").split("?");
+      if (!kConclusions.includes(last)) return last === "samples" || last === "lineage" ? isNew || grows : false;
+      return isNew || (grows && !isConclusion(answer.state === "here" ? answer.value : null));
+    });
+  }
+}
+
+function isConclusion(value: unknown): boolean {
+  if (value === null || typeof value !== "object") return false;
+  return (value as { rms_error?: unknown }).rms_error !== null;
+}
+
+function parse(event: Event): unknown {
+  try {
+    return JSON.parse((event as MessageEvent<string>).data) as unknown;
+  } catch {
+    return {};
+  }
+}

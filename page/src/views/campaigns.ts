@@ -1,0 +1,102 @@
+// Which campaigns are there, in which state, and which comes from which.
+
+import type { Answers } from "../answers.ts";
+import { h, replace, value } from "../dom.ts";
+import type { Status } from "../documents.ts";
+import { linkTo } from "../route.ts";
+import { dateText, nameForPeople, numberText } from "../units.ts";
+import { absent, empty, stateBadge } from "./view.ts";
+
+const kFoldFrom = 6; // derived campaigns below one base that are shown only when asked for
+
+interface Row {
+  status: Status;
+  depth: number;
+  kin: number; // campaigns below it
+}
+
+/// Campaigns in the order of their numbers, what comes from one below it. unfolded: whose many children are shown.
+export function familyRows(list: readonly Status[], unfolded: ReadonlySet<string>): Row[] {
+  const known = new Set(list.map(({ campaign }) => campaign));
+  const children = new Map<string, Status[]>();
+  const roots: Status[] = [];
+  for (const status of list) {
+    if (status.parent !== null && known.has(status.parent) && status.parent !== status.campaign) {
+      const siblings = children.get(status.parent) ?? [];
+      siblings.push(status);
+      children.set(status.parent, siblings);
+    } else {
+      roots.push(status);
+    }
+  }
+  const rows: Row[] = [];
+  const below = (id: string): number => (children.get(id) ?? []).reduce((sum, { campaign }) => sum + 1 + below(campaign), 0);
+  const add = (status: Status, depth: number): void => {
+    const kin = below(status.campaign);
+    rows.push({ status, depth, kin });
+    if (kin >= kFoldFrom && !unfolded.has(status.campaign)) {
+      // A calibrated model of its own is no detail: it stays in sight.
+      for (const child of children.get(status.campaign) ?? []) if (child.purpose === "extension") add(child, depth + 1);
+      return;
+    }
+    for (const child of children.get(status.campaign) ?? []) add(child, depth + 1);
+  };
+  for (const root of roots) add(root, 0);
+  return rows;
+}
+
+/// "extension with rolling resistance".
+export function originOf({ purpose, effects }: Pick<Status, "purpose" | "effects">): string {
+  const added = effects.length === 0 ? "" : `with ${effects.map(nameForPeople).join(", ")}`;
+  return [purpose === null ? "" : nameForPeople(purpose), added].filter((text) => text !== "").join(" ");
+}
+
+export function campaignsView(root: HTMLElement, answers: Answers): () => void {
+  const unfolded = new Set<string>();
+  let list: Status[] = [];
+  const holder = h("div", {});
+  replace(root, h("h1", {}, "Campaigns"), holder);
+  const show = (): void => {
+    if (list.length === 0) {
+      replace(holder, empty("No campaign yet", "A campaign appears here as soon as it is submitted:", h("code", {}, "calibctl submit sand.yaml")));
+      return;
+    }
+    replace(holder, h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Campaigns" },
+      h("table", { class: "campaigns" },
+        h("thead", {}, h("tr", {}, ["campaign", "state", "samples", "effective samples", "best misfit [sd]", "runs", "core hours", "submitted"].map((name, i) =>
+          h("th", { scope: "col", class: i < 2 || i === 7 ? "text" : "" }, name)))),
+        h("tbody", {}, familyRows(list, unfolded).map(row)),
+      )));
+  };
+  const row = ({ status: s, depth, kin }: Row): HTMLElement => {
+    const open = unfolded.has(s.campaign);
+    return h("tr", { "data-campaign": s.campaign },
+      h("th", { scope: "row", class: `name depth${Math.min(depth, 4)}` },
+        h("a", { href: linkTo(s.campaign, "progress") }, s.name || s.campaign),
+        h("span", { class: "id" }, s.campaign),
+        originOf(s) === "" ? null : h("span", { class: "sub" }, originOf(s)),
+        kin < kFoldFrom ? null : h("button", { type: "button", class: "fold", "aria-expanded": String(open), onclick: () => {
+          if (open) unfolded.delete(s.campaign);
+          else unfolded.add(s.campaign);
+          show();
+        } }, open ? `fold ${kin} derived` : `${kin} derived`),
+      ),
+      h("td", { class: "text" }, stateBadge(s.state), s.reason === "" ? null : h("span", { class: "sub" }, s.reason)),
+      h("td", {}, value(s.samples_done, numberText(s.samples_done)), " / ", value(s.samples, numberText(s.samples)),
+        h("span", { class: "sub" }, `iteration ${s.iteration + 1} of ${s.max_iterations}`)),
+      h("td", {}, value(s.effective_sample_size, numberText(s.effective_sample_size, 3))),
+      h("td", {}, value(s.best_misfit, numberText(s.best_misfit, 3))),
+      h("td", {}, value(s.model_evaluations, numberText(s.model_evaluations))),
+      h("td", {}, value(s.core_hours, numberText(s.core_hours, 3))),
+      h("td", { class: "text" }, h("time", { datetime: new Date(s.created_unix_ms).toISOString() }, dateText(s.created_unix_ms))),
+    );
+  };
+  return answers.watch<Status[]>("campaigns", (answer) => {
+    if (answer.state === "here") {
+      list = answer.value;
+      show();
+    } else {
+      replace(holder, absent(answer, "Campaigns appear here."));
+    }
+  });
+}
