@@ -34,7 +34,7 @@ interface Held {
   stale: boolean;
   busy: boolean;
   askedAt: number;
-  timer: ReturnType<typeof setTimeout> | null;
+  planned: boolean;
 }
 
 export class Answers {
@@ -43,6 +43,7 @@ export class Answers {
   constructor(
     private readonly ask: Ask,
     private readonly now: () => number = () => performance.now(),
+    private readonly later: (task: () => void, ms: number) => void = (task, ms) => void setTimeout(task, ms),
   ) {}
 
   /// Calls `listener` with what is known of the document, at once and whenever that changes, until the returned function is
@@ -79,7 +80,7 @@ export class Answers {
         stale: true,
         busy: false,
         askedAt: -Infinity,
-        timer: null,
+        planned: false,
       };
       this.held.set(path, entry);
     }
@@ -87,13 +88,14 @@ export class Answers {
   }
 
   private plan(entry: Held): void {
-    if (!entry.stale || entry.busy || entry.timer !== null || entry.listeners.size === 0) return;
+    if (!entry.stale || entry.busy || entry.planned || entry.listeners.size === 0) return;
     const wait = entry.askedAt + kLeastInterval - this.now();
     if (wait <= 0) {
       void this.fetch(entry);
     } else {
-      entry.timer = setTimeout(() => {
-        entry.timer = null;
+      entry.planned = true;
+      this.later(() => {
+        entry.planned = false;
         if (entry.listeners.size > 0) void this.fetch(entry);
       }, wait);
     }
@@ -129,7 +131,7 @@ export class Answers {
     } else {
       this.tell(entry, { state: "failed", status: reply.status, sentence: sentenceOf(reply) });
       if (reply.status === 503) {
-        setTimeout(() => {
+        this.later(() => {
           entry.stale = true;
           this.plan(entry);
         }, kTryAgainAfter);

@@ -82,6 +82,7 @@ function showCampaign(campaign: string, view: ViewName, options: URLSearchParams
     h("nav", { class: "views", "aria-label": "Views of the campaign" }, kViews.map((name) =>
       h("a", { href: linkTo(campaign, name), "aria-current": name === view ? "page" : null }, kQuestions[name].question))),
     root);
+  main.querySelector(".views [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
   document.title = `${campaign} – calib`;
   const stopHead = answers.watch<Status>(`campaigns/${campaign}`, (answer) => {
     if (answer.state !== "here") return;

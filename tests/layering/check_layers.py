@@ -22,7 +22,7 @@ class Tree:
         self.root = root
         self.folders = collections.defaultdict(list)  # folder -> names
         for path, folders, names in os.walk(root):
-            folders[:] = sorted(f for f in folders if not f.startswith(('.', 'build')) and f != '__pycache__')
+            folders[:] = sorted(f for f in folders if not f.startswith(('.', 'build')) and f not in ('__pycache__', 'node_modules'))
             self.folders[os.path.relpath(path, root)] = sorted(names)
 
     def lines(self, path):

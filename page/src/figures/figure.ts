@@ -54,6 +54,8 @@ export function drawn(label: string, options: Plot.PlotOptions): SVGSVGElement {
     style: {},
   }) as unknown as SVGSVGElement;
   for (const style of element.querySelectorAll("style")) style.remove();
+  // A drawing is one image with one label; its table is what is read piece by piece.
+  for (const part of element.querySelectorAll("[aria-label]")) part.removeAttribute("aria-label");
   element.setAttribute("role", "img");
   element.setAttribute("aria-label", label);
   return element;
@@ -71,7 +73,9 @@ export function withValues(
   for (const parent of element.querySelectorAll(`g.${group}`)) {
     for (const child of parent.children) {
       const index = (child as Element & { __data__?: unknown }).__data__;
-      if (typeof index === "number") child.setAttribute("data-value", String(values[index] ?? "null"));
+      if (typeof index !== "number") continue;
+      child.setAttribute("data-value", String(values[index] ?? "null"));
+      child.setAttribute("data-index", String(index));
     }
   }
   return element;

@@ -154,7 +154,7 @@ function density(axis: Axis, posteriors: readonly NamedPosterior[], frame: Frame
     ...frame, x: labelled(axis, last), y: first ? { domain: [0, 1.08], label: null, ticks: 0 } : { domain: [0, 1.08], axis: null }, marks,
   });
   withValues(element, "median", [posteriors[0]?.posterior.parameters[axis.name]?.q50]);
-  element.removeAttribute("role");
+  for (const name of ["role", "aria-label"]) element.removeAttribute(name);
   return element;
 }
 
@@ -170,9 +170,9 @@ function pair(x: Axis, y: Axis, posteriors: readonly NamedPosterior[], frame: Fr
     marks.push(Plot.density(points, { x: "0", y: "1", thresholds: 3, bandwidth: 12, stroke: color, strokeWidth: 1, strokeOpacity: 0.8, clip: true }));
   });
   const element = drawn(`${nameForPeople(y.name)} over ${nameForPeople(x.name)}`, {
-    ...frame, x: labelled(x, last), y: labelled(y, first), marks,
+    ...frame, x: labelled(x, last), y: { ...labelled(y, first), labelOffset: kMargin.left - 4 }, marks,
   });
-  element.removeAttribute("role");
+  for (const name of ["role", "aria-label"]) element.removeAttribute(name);
   return element;
 }
 

@@ -5,7 +5,7 @@ import type { Comparison, Grains, Samples } from "../documents.ts";
 import { nameForPeople, quantityText } from "../units.ts";
 import { kColorings, type Coloring } from "../grains/colorings.ts";
 import type { Scene } from "../grains/scene.ts";
-import { copyable, empty, valueOf, watchAll, type View } from "./view.ts";
+import { absent, copyable, empty, valueOf, watchAll, type View } from "./view.ts";
 
 type SceneModule = typeof import("../grains/scene.ts");
 const loadScene = (): Promise<SceneModule> => import("./grains.js" as string) as Promise<SceneModule>;
@@ -20,6 +20,7 @@ export const grainsView: View = (root, context) => {
   let ended = false;
   let stopGrains = (): void => {};
   replace(root, h("h2", {}, "The grains"), choosers, holder);
+  replace(holder, absent(undefined, null));
 
   const coloring = kColorings.find((name) => name === options.get("color")) ?? "force";
   const query = (sample: string): string => {

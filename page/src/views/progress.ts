@@ -3,7 +3,7 @@
 import { h, replace, value } from "../dom.ts";
 import type { Lineage, Shown, Status } from "../documents.ts";
 import { linkTo } from "../route.ts";
-import { originOf } from "./campaigns.ts";
+import { originOf } from "./family.ts";
 import { dateText, durationText, nameForPeople } from "../units.ts";
 import { absent, copyable, plainReading, reading, stateBadge, valueOf, warnings, watchAll, type View } from "./view.ts";
 

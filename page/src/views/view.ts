@@ -89,9 +89,14 @@ export function absent(answer: Answer<unknown> | undefined, comes: Child): HTMLE
   return null;
 }
 
+const kWarningsInSight = 2;
+
 export function warnings(texts: readonly string[]): HTMLElement | null {
   if (texts.length === 0) return null;
-  return h("aside", { class: "warnings", "aria-label": "Warnings" }, h("ul", {}, texts.map((text) => h("li", {}, text))));
+  const list = (some: readonly string[]): HTMLElement => h("ul", {}, some.map((text) => h("li", {}, text)));
+  const rest = texts.slice(kWarningsInSight);
+  return h("section", { class: "warnings", "aria-label": "Warnings" }, list(texts.slice(0, kWarningsInSight)),
+    rest.length === 0 ? null : h("details", {}, h("summary", {}, rest.length === 1 ? "1 more warning" : `${rest.length} more warnings`), list(rest)));
 }
 
 /// A number with its name: the instrument's dial.
