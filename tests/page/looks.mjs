@@ -89,7 +89,8 @@ export async function figures(tab, least = 1) {
       for (const figure of document.querySelectorAll("figure")) {
         if (figure.querySelector("svg.plot")) continue;
         figure.scrollIntoView();
-        await new Promise((resolve) => requestAnimationFrame(resolve));
+        // What has come into sight is told after the frame: the second one is past that.
+        for (let frame = 0; frame < 2; ++frame) await new Promise((resolve) => requestAnimationFrame(resolve));
       }
       window.scrollTo(0, 0);
     });
