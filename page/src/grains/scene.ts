@@ -57,7 +57,7 @@ export function makeScene(canvas: HTMLCanvasElement, document: Grains, coloring:
   scene.add(sun);
 
   const camera = new three.PerspectiveCamera(32, 1, 0.01, 20);
-  camera.position.set(1.5, 1.1, 2.1);
+  camera.position.set(2.2, -1.9, 1.1); // all of a cube of size one in sight
   camera.up.set(0, 0, 1);
   const controls = new OrbitControls(camera, canvas);
   controls.enableDamping = false; // nothing moves that nobody moves
