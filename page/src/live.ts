@@ -19,7 +19,7 @@ interface CampaignEvent {
 
 // What follows from the samples of whole iterations, and from what was concluded about them.
 const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
-// Of a campaign that has no conclusion yet these still grow with its runs, but no eye needs them faster.
+// What grows with every run, as lists and the fit of what has no conclusion yet: no eye needs them faster.
 const kGrowing = 3000; // ms
 
 export class Live {
@@ -78,7 +78,7 @@ export class Live {
     const grows = now - (this.lastGrowth.get(id) ?? -Infinity) >= kGrowing;
     if (grows) this.lastGrowth.set(id, now);
     this.answers.mark((path, answer) => {
-      if (path === "campaigns") return true;
+      if (path === "campaigns") return grows;
       if (path === `campaigns/${id}`) return true;
       if (!path.startsWith(`campaigns/${id}/`)) return false;
       const [last = ""] = (path.split("/")[2] ?? "").split("?");
