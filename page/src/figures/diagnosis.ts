@@ -159,7 +159,7 @@ export function stepsFigure(improvement: Improvement): Figure {
   const draw = (width: number): SVGSVGElement => {
     const marks: Plot.Markish[] = [
       Plot.ruleY([1], { stroke: "var(--good)", strokeDasharray: "5 4" }),
-      Plot.text([1], { y: 1, text: () => "as expected", frameAnchor: "right", dy: -7, fill: "var(--good)", textAnchor: "end" }),
+      Plot.text([1], { y: 1, text: () => "as expected", frameAnchor: "left", dx: 4, dy: -7, fill: "var(--good)", textAnchor: "start" }),
     ];
     series.forEach(({ name, values, color }, i) => {
       const points = values.map((value, step) => ({ label: labels[step]!, value }));
