@@ -17,7 +17,7 @@ const volumetric = (friction, strain) => 0.1 * strain * Math.exp(-60 * strain) -
 /// Writes large.yaml and its tables into the folder.
 export function writeLarge(folder, samples) {
   const rows = ["sample,E,mu"];
-  const states = ["sample,load_step,axial_strain,q,v"];
+  const states = ["sample,step,axial_strain,q,v"];
   for (let n = 0; n < samples; ++n) {
     const [modulus, friction] = [2e8 + 8e8 * share(n, 0), 0.2 + 0.6 * share(n, 1)];
     rows.push(`${n},${modulus},${friction}`);
@@ -44,7 +44,7 @@ experiments:
   - name: tx
     test: triaxial_drained
     confining_pressure: 100 kPa
-    data: {file: tx.csv}
+    data: {file: tx.csv, strain: logarithmic}
     control: axial_strain
     observables:
       q_over_p: {noise: {absolute: 0.03}}
