@@ -19,7 +19,7 @@ interface CampaignEvent {
 
 // What follows from the samples of whole iterations, and from what was concluded about them.
 const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
-// Of a campaign that has no conclusion yet these still grow with its runs, but no eye needs them faster.
+// What grows with every run, as lists and the fit of what has no conclusion yet: no eye needs them faster.
 const kGrowing = 3000; // ms
 
 export class Live {
@@ -33,7 +33,16 @@ export class Live {
     private readonly tell: (connection: Connection) => void,
   ) {}
 
+  /// Opens the stream, once and for all.
   start(): void {
+    // Nobody looks: nothing is asked. Who comes back sees what is so now.
+    document.addEventListener("visibilitychange", () => {
+      if (!document.hidden) this.answers.mark(() => true);
+    });
+    this.open();
+  }
+
+  private open(): void {
     this.tell({ state: "connecting" });
     const source = new EventSource("api/v1/events");
     source.onopen = () => {
@@ -48,8 +57,8 @@ export class Live {
       this.retryS = Math.min(2 * this.retryS, kLastRetryS);
     };
     source.addEventListener("campaign", (event) => this.onCampaign(parse(event) as CampaignEvent));
-    source.addEventListener("campaigns", () => this.answers.mark((path) => path === "campaigns" || path.endsWith("/lineage")));
-    source.addEventListener("workers", () => this.answers.mark((path) => path === "workers"));
+    source.addEventListener("campaigns", () => this.mark((path) => path === "campaigns" || path.endsWith("/lineage")));
+    source.addEventListener("workers", () => this.mark((path) => path === "workers"));
     for (const name of ["hello", "server"]) {
       source.addEventListener(name, (event) => {
         const { up } = parse(event) as { up?: boolean };
@@ -59,9 +68,13 @@ export class Live {
     }
   }
 
+  private mark(which: Parameters<Answers["mark"]>[0]): void {
+    if (!document.hidden) this.answers.mark(which);
+  }
+
   private countDown(seconds: number): void {
     if (seconds <= 0) {
-      this.start();
+      this.open();
       return;
     }
     this.tell({ state: "lost", retryInS: seconds });
@@ -77,8 +90,8 @@ export class Live {
     const now = performance.now();
     const grows = now - (this.lastGrowth.get(id) ?? -Infinity) >= kGrowing;
     if (grows) this.lastGrowth.set(id, now);
-    this.answers.mark((path, answer) => {
-      if (path === "campaigns") return true;
+    this.mark((path, answer) => {
+      if (path === "campaigns") return grows;
       if (path === `campaigns/${id}`) return true;
       if (!path.startsWith(`campaigns/${id}/`)) return false;
       const [last = ""] = (path.split("/")[2] ?? "").split("?");

@@ -30,7 +30,8 @@ const kQuestions: Record<ViewName, { question: string; view: View }> = {
 
 export function showLivePage(): void {
   const answers = new Answers(askServer);
-  const connection = h("p", { class: "connection", role: "status" });
+  const [said, countdown] = [h("span", { role: "status" }), h("span", { "aria-hidden": "true" })];
+  const connection = h("p", { class: "connection" }, h("span", { class: "lamp", "aria-hidden": "true" }), said, countdown);
   const nav = h("nav", { "aria-label": "Pages" });
   const main = h("main", { id: "content", tabindex: -1 });
   append(document.body, [
@@ -44,13 +45,14 @@ export function showLivePage(): void {
 
   function sayConnection(now: Connection): void {
     const text = {
-      connecting: () => "connecting …",
-      open: () => "live",
-      server_away: () => "calibd does not answer; shown is what was known",
-      lost: () => `the server does not answer; tried again in ${(now as { retryInS: number }).retryInS} s`,
-    }[now.state]();
+      connecting: "connecting …",
+      open: "live",
+      server_away: "calibd does not answer; shown is what was known",
+      lost: "the server does not answer",
+    }[now.state];
     connection.className = `connection ${now.state}`;
-    replace(connection, h("span", { class: "lamp", "aria-hidden": "true" }), text);
+    if (said.textContent !== text) said.textContent = text; // what is said aloud is said once
+    countdown.textContent = now.state === "lost" ? `; tried again in ${now.retryInS} s` : "";
   }
 
   let end = (): void => {};

@@ -1,4 +1,5 @@
-// A report: the same views of documents that stand in the file itself, one below the other, what decides first.
+// A report: the same views of documents that stand in the file itself, one below the other, what decides first. The file has
+// page.css and page.js inline, and in <script type="application/json" id="documents"> what `Embedded` says, `<` as \u003c.
 
 import { Answers } from "./answers.ts";
 import { append, h } from "./dom.ts";

@@ -10,7 +10,7 @@ import { join } from "node:path";
 import { argv } from "node:process";
 import { promisify } from "node:util";
 import { assertAccessible, assertFits, get, goTo, launch, openTab, picture, tools, until } from "./looks.mjs";
-import { assertList, assertView, assertWorkers, kViews } from "./views.mjs";
+import { assertList, assertTakenAlong, assertView, assertWorkers, kViews } from "./views.mjs";
 
 const [chromium, bin, modules, pictures] = argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), "calib-page-"));
@@ -146,6 +146,8 @@ async function main() {
     assert.deepEqual(await other.violations(), []);
     await other.tab.close();
   }
+
+  await assertTakenAlong(tab, "c1");
 
   // Names are text.
   await goTo(tab, "#/c1/progress");

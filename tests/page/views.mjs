@@ -1,7 +1,7 @@
 // Every view of a campaign, held against the documents it is drawn from.
 
 import assert from "node:assert/strict";
-import { assertHeights, figures, get, goTo, same } from "./looks.mjs";
+import { assertHeights, figures, get, goTo, same, until } from "./looks.mjs";
 
 const shownValue = (tab, selector) =>
   tab.evaluate((wanted) => document.querySelector(wanted)?.getAttribute("data-value") ?? null, selector);
@@ -94,6 +94,41 @@ async function grains(tab) {
 }
 
 export const kViews = { progress, fit, misfit, parameters, missing, error, grains };
+
+/// A figure as table, CSV and SVG, reached with the keyboard alone.
+export async function assertTakenAlong(tab, id) {
+  await goTo(tab, `#/${id}/fit`);
+  await figures(tab, 1);
+  const compared = await get(tab, `campaigns/${id}/compare`);
+  const [{ observables, experiment }] = compared.experiments;
+  const figure = `[data-figure="fit-${experiment}-${observables[0].name}"]`;
+  await tab.evaluate(() => {
+    window.taken = {};
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      void blob.text().then((text) => (window.taken[blob.type] = text));
+      return make.call(URL, blob);
+    };
+  });
+  await tab.focus(`${figure} .tools button`);
+  for (let i = 0; i < 3; ++i) {
+    await tab.keyboard.press("Enter");
+    await tab.keyboard.press("Tab");
+  }
+  const rows = await tab.evaluate((of) => [...document.querySelectorAll(`${of} tbody tr`)].map((row) => row.children[3].getAttribute("data-value")), figure);
+  assert.deepEqual(rows.map((text) => (text === "null" ? null : Number(text))), observables[0].values, "the table's readings");
+  await until("CSV and SVG are made", () => tab.evaluate(() => window.taken["text/csv"] && window.taken["image/svg+xml"]));
+  const { csv, svg } = await tab.evaluate(() => ({ csv: window.taken["text/csv"], svg: window.taken["image/svg+xml"] }));
+  const [head, first] = csv.split("\r\n").map((line) => line.split(","));
+  assert.deepEqual(head.slice(0, 2), ["reading", "stage"]);
+  assert.equal(Number(first[3]), observables[0].values[0], "SI in the CSV");
+  const alone = await tab.evaluate((text) => {
+    const parsed = new DOMParser().parseFromString(text, "image/svg+xml");
+    return { whole: parsed.querySelector("parsererror") === null, points: parsed.querySelectorAll(".readings circle").length };
+  }, svg);
+  assert.deepEqual(alone, { whole: true, points: observables[0].values.filter((value) => value !== null).length });
+  assert.ok(!svg.includes("var("), "the drawing's colours go with it");
+}
 
 export async function assertView(tab, id, name) {
   await goTo(tab, `#/${id}/${name}`);

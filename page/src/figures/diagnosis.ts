@@ -71,9 +71,9 @@ export function signatureFigure(
     path: number;
     lack: number; // SI
     sd: Maybe;
+    changes: Maybe[]; // by each candidate
   }
   const lacks: Lack[] = [];
-  const lines: { experiment: string; path: number; change: Maybe; candidate: number }[] = [];
   let control = { name: "", unit: "1" };
   let siUnit = "1";
   for (const one of experiments) {
@@ -82,16 +82,14 @@ export function signatureFigure(
     control = { name: one.control, unit: one.control_unit };
     const path = travelled(one.control_values);
     siUnit = found.unit;
+    const curves = candidates.map((candidate) =>
+      candidate.curves.find((each) => each.experiment === one.experiment && each.observable === observable));
     found.values.forEach((measured, i) => {
       const model = found.bands?.mean[i];
-      if (finite(measured) && finite(model)) {
-        lacks.push({ experiment: one.experiment, path: path[i]!, lack: measured - model, sd: found.total_sd[i] ?? null });
-      }
-    });
-    candidates.forEach(({ curves }, candidate) => {
-      const curve = curves.find((each) => each.experiment === one.experiment && each.observable === observable);
-      curve?.change.forEach((change, i) => {
-        lines.push({ experiment: one.experiment, path: path[i] ?? NaN, change, candidate });
+      if (!finite(measured) || !finite(model)) return;
+      lacks.push({
+        experiment: one.experiment, path: path[i]!, lack: measured - model, sd: found.total_sd[i] ?? null,
+        changes: curves.map((curve) => curve?.change[i] ?? null),
       });
     });
   }
@@ -117,8 +115,8 @@ export function signatureFigure(
       }),
     ];
     candidates.forEach((_, i) => {
-      marks.push(Plot.line(lines.filter(({ candidate }) => candidate === i), {
-        ...facet, x: (l: (typeof lines)[number]) => l.path * xUnit.factor, y: (l: (typeof lines)[number]) => scaled(l.change, yUnit.factor),
+      marks.push(Plot.line(lacks, {
+        ...facet, x: (l: Lack) => l.path * xUnit.factor, y: (l: Lack) => scaled(l.changes[i], yUnit.factor), z: "experiment",
         stroke: cycled(kSeries, i), strokeWidth: i === 0 ? 2.2 : 1.5, strokeDasharray: cycled(kDashes, i),
       }));
     });
@@ -138,8 +136,9 @@ export function signatureFigure(
       columns: [
         { name: "experiment" }, { name: `path of ${control.name}`, unit: control.unit, shown: xUnit },
         { name: "measurement minus model", unit: siUnit, shown: yUnit }, { name: "sd", unit: siUnit, shown: yUnit },
+        ...candidates.map(({ effect }) => ({ name: nameForPeople(effect), unit: siUnit, shown: yUnit })),
       ],
-      rows: lacks.map((l) => [l.experiment, l.path, l.lack, l.sd]),
+      rows: lacks.map((l) => [l.experiment, l.path, l.lack, l.sd, ...l.changes]),
     }),
   };
 }
@@ -159,7 +158,7 @@ export function stepsFigure(improvement: Improvement): Figure {
   const draw = (width: number): SVGSVGElement => {
     const marks: Plot.Markish[] = [
       Plot.ruleY([1], { stroke: "var(--good)", strokeDasharray: "5 4" }),
-      Plot.text([1], { y: 1, text: () => "as expected", frameAnchor: "right", dy: -7, fill: "var(--good)", textAnchor: "end" }),
+      Plot.text([1], { y: 1, text: () => "as expected", frameAnchor: "left", dx: 4, dy: -7, fill: "var(--good)", textAnchor: "start" }),
     ];
     series.forEach(({ name, values, color }, i) => {
       const points = values.map((value, step) => ({ label: labels[step]!, value }));

@@ -2,7 +2,7 @@
 
 import * as Plot from "@observablehq/plot";
 import type { FittedExperiment, FittedObservable, Maybe, Run } from "../documents.ts";
-import { axisLabel, largest, nameForPeople, unitForPeople } from "../units.ts";
+import { axisLabel, largest, nameForPeople, quantityText, unitForPeople } from "../units.ts";
 import { below, drawn, finite, scaled, withValues, type Column, type Figure, type KeyEntry, type Table } from "./figure.ts";
 
 /// Against what readings are drawn: the control, or another observable of the test.
@@ -104,6 +104,11 @@ export function fitFigure(experiment: FittedExperiment, observable: FittedObserv
         }),
         Plot.dot(rows, {
           x: xOf, y: at(observable.values), r: 2.4, fill: "var(--measured)", className: "readings",
+          title: (i: number) => [
+            `${nameForPeople(against.name)} ${quantityText(against.values[i], against.name, against.unit)}`,
+            `measured ${quantityText(observable.values[i], observable.name, observable.unit)} ± ${quantityText(observable.total_sd[i], observable.name, observable.unit, 2)}`,
+            ...(median === null ? [] : [`model ${quantityText(median[i], observable.name, observable.unit)}`]),
+          ].join("\n"),
         }),
       ],
     });

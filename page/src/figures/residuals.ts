@@ -103,6 +103,7 @@ export function residualFigure(experiments: readonly FittedExperiment[], observa
           fy: "experiment", x: ({ path }: Point) => path * unit.factor, y: (p: Point) => scaled(p.residual, 1), r: 2.6,
           fill: ({ role }: Point) => (role === "validate" ? "var(--paper)" : "var(--model)"),
           stroke: ({ role }: Point) => (role === "validate" ? "var(--held)" : "var(--model)"), className: "residuals",
+          title: (p: Point) => `${p.experiment}, reading ${p.reading}, ${nameForPeople(p.stage)}: ${numberText(p.residual, 3)} sd`,
         }),
       ],
     });
@@ -153,6 +154,7 @@ export function stageMap(comparison: Comparison): Figure {
         Plot.cell(rows, {
           ...(beside ? { fx: "observable" } : { fy: "observable" }), x: "segment", y: "experiment", inset: 1.5, rx: 3,
           fill: "var(--misfit)", fillOpacity: (row: Row) => row.rms_error ?? 0, className: "stages",
+          title: (row: Row) => `${row.experiment}, ${nameForPeople(row.observable)}, ${nameForPeople(row.segment)}: ${numberText(row.rms_error, 3)} sd over ${row.readings} readings, bias z = ${numberText(row.z, 2)}`,
         }),
         ...(beside ? [] : [Plot.text(observables, { fy: (name: string) => name, text: nameForPeople, frameAnchor: "top-left", dy: -14, fontWeight: 600, fill: "var(--ink)" })]),
         Plot.text(rows, {

@@ -11,6 +11,7 @@ export interface Scene {
 }
 
 const kThickest = 0.35; // of the mean radius, for the largest force
+const kHalfView = 0.29; // tangent of half the angle of view, of the shorter side
 const kTurn = Math.PI / 24; // a key's
 const kNearer = 0.9;
 
@@ -56,7 +57,7 @@ export function makeScene(canvas: HTMLCanvasElement, document: Grains, coloring:
   sun.position.set(1, 2, 3);
   scene.add(sun);
 
-  const camera = new three.PerspectiveCamera(32, 1, 0.01, 20);
+  const camera = new three.PerspectiveCamera(1, 1, 0.01, 20);
   camera.position.set(2.2, -1.9, 1.1); // all of a cube of size one in sight
   camera.up.set(0, 0, 1);
   const controls = new OrbitControls(camera, canvas);
@@ -69,6 +70,7 @@ export function makeScene(canvas: HTMLCanvasElement, document: Grains, coloring:
     renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     renderer.setSize(width, height, false);
     camera.aspect = width / Math.max(1, height);
+    camera.fov = 2 * three.MathUtils.radToDeg(Math.atan(kHalfView / Math.min(1, camera.aspect))); // of the height
     camera.updateProjectionMatrix();
     draw();
   };

@@ -18,12 +18,18 @@ export function campaignsView(root: HTMLElement, answers: Answers): () => void {
       replace(holder, empty("No campaign yet", "A campaign appears here as soon as it is submitted:", h("code", {}, "calibctl submit sand.yaml")));
       return;
     }
+    const active = holder.contains(document.activeElement) ? document.activeElement : null;
+    const focused = active?.closest<HTMLElement>("[data-campaign]")?.dataset["campaign"];
     replace(holder, h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Campaigns" },
       h("table", { class: "campaigns" },
         h("thead", {}, h("tr", {}, ["campaign", "state", "samples", "effective samples", "best misfit [sd]", "runs", "core hours", "submitted"].map((name, i) =>
           h("th", { scope: "col", class: i < 2 || i === 7 ? "text" : "" }, name)))),
         h("tbody", {}, familyRows(list, unfolded).map(row)),
       )));
+    // The table is made anew; who was on a row stays there.
+    if (active !== null && focused !== undefined) {
+      holder.querySelector<HTMLElement>(`[data-campaign="${CSS.escape(focused)}"] ${active.localName}`)?.focus({ preventScroll: true });
+    }
   };
   const row = ({ status: s, depth, kin }: Row): HTMLElement => {
     const open = unfolded.has(s.campaign);

@@ -4,7 +4,7 @@ import { h, replace, value } from "../dom.ts";
 import type { Comparison, FittedExperiment, MisfitRow } from "../documents.ts";
 import { fitFigure } from "../figures/fit.ts";
 import { chanceText, nameForPeople, numberText } from "../units.ts";
-import { absent, empty, FigureList, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
+import { absent, empty, FigureList, keeper, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
 
 /// The errors of a comparison in a sentence.
 export function fitSentence(comparison: Comparison): HTMLElement | null {
@@ -28,16 +28,18 @@ export const fitView: View = (root, context) => {
   const sentence = h("div", {});
   const holder = h("div", {});
   const x = context.options.get("x") ?? "";
+  const [keepSentence, keepChooser] = [keeper(sentence), keeper(chooser)];
   replace(root, h("h2", {}, "Does it fit?"), sentence, chooser, holder);
   return watchAll(context, [`campaigns/${context.campaign}/compare`], ([answer]) => {
     const comparison = valueOf<Comparison>(answer);
     const experiments = comparison?.experiments ?? [];
     if (comparison === null || experiments.length === 0) {
-      replace(sentence, comparison === null ? absent(answer, "Readings and runs are drawn from the first run on; the median and its bands after the first iteration.") : empty("Nothing to compare", comparison.note));
+      keepSentence([answer?.state, comparison?.note], () => comparison === null ? absent(answer, "Readings and runs are drawn from the first run on; the median and its bands after the first iteration.") : empty("Nothing to compare", comparison.note));
       return;
     }
-    replace(sentence, fitSentence(comparison), warnings(comparison.warnings));
-    replace(chooser, axisChooser(experiments, x, context));
+    const { rms_error, heldout_rms_error, p_value, note } = comparison;
+    keepSentence([rms_error, heldout_rms_error, p_value, note, comparison.warnings], () => [fitSentence(comparison), warnings(comparison.warnings)]);
+    keepChooser(experiments.map((one) => [one.control, one.observables.map(({ name }) => name)]), () => axisChooser(experiments, x, context));
     for (const experiment of experiments) {
       let section = sections.get(experiment.experiment);
       if (section === undefined) {

@@ -4,7 +4,7 @@ import { h, replace, value } from "../dom.ts";
 import type { Candidate, Comparison, Diagnosis, Shown } from "../documents.ts";
 import { modelName, probabilityFigure, signatureFigure } from "../figures/diagnosis.ts";
 import { chanceText, nameForPeople, numberText, quantityText } from "../units.ts";
-import { absent, copyable, empty, FigureList, valueOf, warnings, watchAll, type View } from "./view.ts";
+import { absent, copyable, FigureList, valueOf, warnings, watchAll, type View } from "./view.ts";
 
 const kDrawnCandidates = 4; // told apart by eye over one residual
 
@@ -93,5 +93,5 @@ function nextSection(diagnosis: Diagnosis, shown: Shown | null): HTMLElement {
         experiment.forecast === null ? null : h("div", { class: "reading" }, h("dt", {}, "names a wrong one with"), h("dd", {}, value(experiment.forecast.names_wrong, chanceText(experiment.forecast.names_wrong))))),
       copyable(experiment.snippet, "the experiment for the campaign file"),
     ],
-    command === null ? (experiment === null ? empty("Nothing proposed", "The diagnosis proposes neither a test nor a command.") : null) : [h("h3", {}, "The command that goes on"), copyable(command, "the command")]);
+    command === null ? (experiment === null ? h("p", {}, "The diagnosis proposes no further test.") : null) : [h("h3", {}, "The command that goes on"), copyable(command, "the command")]);
 }

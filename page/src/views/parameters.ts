@@ -5,7 +5,7 @@ import type { Answer } from "../answers.ts";
 import type { Lineage, Posterior } from "../documents.ts";
 import { cornerFigure, inferredParameters, pathFigure, type NamedPosterior } from "../figures/parameters.ts";
 import { chanceText, nameForPeople, numberText, quantityText, unitForPeople } from "../units.ts";
-import { absent, empty, FigureList, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
+import { absent, empty, FigureList, keeper, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
 
 const kMostInCorner = 6;
 
@@ -42,6 +42,7 @@ export const parametersView: View = (root, context) => {
   const others = (context.options.get("with") ?? "").split(",").filter((other) => other !== "" && other !== id);
   const top = h("div", {});
   const chooser = h("div", { class: "choosers" });
+  const keepChooser = keeper(chooser);
   const corner = new FigureList("figures single");
   const paths = new FigureList();
   const along = h("h2", { hidden: true }, "How the estimate comes about");
@@ -68,7 +69,7 @@ export const parametersView: View = (root, context) => {
       const other = valueOf<Posterior>(answer);
       if (other !== null) laid.push({ name: nameIn(lineage, others[i]!), posterior: other });
     });
-    replace(chooser, overlayChooser(lineage, others, context));
+    keepChooser(valueOf<Lineage>(lineage), () => overlayChooser(lineage, others, context));
     corner.update([cornerFigure(laid, names.slice(0, kMostInCorner))]);
     along.hidden = posterior.path.length === 0;
     paths.update(posterior.path.length === 0 ? [] : names.map((name) => pathFigure(posterior, name)));

@@ -5,7 +5,7 @@ import type { Lineage, Shown, Status } from "../documents.ts";
 import { linkTo } from "../route.ts";
 import { originOf } from "./family.ts";
 import { dateText, durationText, nameForPeople } from "../units.ts";
-import { absent, copyable, plainReading, reading, stateBadge, valueOf, warnings, watchAll, type View } from "./view.ts";
+import { absent, copyable, keeper, plainReading, reading, stateBadge, valueOf, warnings, watchAll, type View } from "./view.ts";
 
 interface Part {
   name: string;
@@ -60,14 +60,23 @@ function kin(lineage: Lineage | null, shown: Shown): HTMLElement | null {
 
 export const progressView: View = (root, context) => {
   const id = context.campaign;
+  const [now, said, next, family] = [h("div", {}), h("div", {}), h("div", {}), h("div", {})];
+  const [keepSaid, keepNext, keepFamily] = [keeper(said), keeper(next), keeper(family)];
+  replace(root, now, said, next, family);
   return watchAll(context, [`campaigns/${id}`, `campaigns/${id}/lineage`], ([answer, lineage]) => {
     const shown = valueOf<Shown>(answer);
     if (shown === null) {
-      replace(root, absent(answer, "The campaign's progress."));
+      replace(now, absent(answer, "The campaign's progress."));
       return;
     }
+    const problems = [shown.problem, shown.server_waits, ...shown.warnings].filter((text): text is string => text !== null);
+    const nodes = valueOf<Lineage>(lineage);
+    keepSaid(problems, () => warnings(problems));
+    keepNext(shown.next_command ?? null, () =>
+      shown.next_command ? h("section", {}, h("h2", {}, "What next"), copyable(shown.next_command, "the command")) : null);
+    keepFamily([nodes, shown.parent], () => kin(nodes, shown));
     const live = shown.state === "running" || shown.state === "queued";
-    replace(root,
+    replace(now,
       h("h2", {}, "How far is it?"),
       h("p", { class: "answer" },
         shown.state === "finished" ? (shown.converged ? "It has finished, and the posterior no longer moves." : "It has finished.") :
@@ -85,9 +94,6 @@ export const progressView: View = (root, context) => {
         plainReading("model evaluations", shown.model_evaluations, 6),
         plainReading("core hours", shown.core_hours),
       ),
-      warnings([...(shown.problem === null ? [] : [shown.problem]), ...(shown.server_waits === null ? [] : [shown.server_waits]), ...shown.warnings]),
-      shown.next_command ? h("section", {}, h("h2", {}, "What next"), copyable(shown.next_command, "the command")) : null,
-      kin(valueOf<Lineage>(lineage), shown),
     );
   });
 };

@@ -1,7 +1,7 @@
 // What views share: how they ask for documents, what they say while there is nothing to show, headings and warnings.
 
 import type { Answer, Answers } from "../answers.ts";
-import { h, value, type Child } from "../dom.ts";
+import { h, replace, value, type Child } from "../dom.ts";
 import type { Figure } from "../figures/figure.ts";
 import { frameOf, type Frame } from "../figures/frame.ts";
 import type { Status } from "../documents.ts";
@@ -74,6 +74,17 @@ export class FigureList {
       if (this.element.children[i] !== frame.element) this.element.insertBefore(frame.element, this.element.children[i] ?? null);
     });
   }
+}
+
+/// Fills an element anew only when what it shows has changed: what is open in it, chosen or focused stays.
+export function keeper(element: HTMLElement): (shows: unknown, make: () => Child) => void {
+  let last: string | null = null;
+  return (shows, make) => {
+    const key = JSON.stringify(shows);
+    if (key === last) return;
+    last = key;
+    replace(element, make());
+  };
 }
 
 /// What is said where nothing can be drawn: why, and what will come when.
