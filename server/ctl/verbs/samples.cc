@@ -26,14 +26,12 @@ absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& o
   ASSIGN_OR_RETURN(const auto samples, client.GetSamples(options.campaign));
   ASSIGN_OR_RETURN(const auto source, client.GetSource(options.campaign));
   ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(client, source));
-  std::vector<std::string> names;
   std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
-    names.push_back(parameter.name);
     columns.push_back(parameter.name);
   }
   if (common.json) {
-    std::cout << report::SamplesJson(options.campaign, names, samples);
+    std::cout << report::SamplesJson(options.campaign, campaign.parameters, samples);
     return kDone;
   }
   report::TextTable table(columns);

@@ -33,8 +33,9 @@ std::string ShownJson(const v1::CampaignStatus& status,
                       const std::vector<v1::Finding>& findings,
                       const std::vector<std::string>& warnings);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
-/// parameters: names in the order of each sample's values.
-std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+/// parameters: in the order of each sample's values.
+std::string SamplesJson(const std::string& campaign,
+                        std::span<const campaign::CalibratedParameter> parameters,
                         const std::vector<v1::Sample>& samples);
 std::string StatesJson(const std::string& campaign, int sample,
                        const std::map<std::string, StateHistory>& by_experiment);
