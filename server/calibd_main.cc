@@ -1,4 +1,7 @@
 // calibd: the service.
+#include <sys/prctl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
@@ -71,7 +74,7 @@ int main(int argc, char** argv) {
       "Holds calibration campaigns and leases their model evaluations to calib-worker nodes."};
   calib::service::ServerOptions options;
   options.listen = "127.0.0.1:7443";
-  options.stays = true;
+  int parent = -1;
   std::int64_t lease_ms = options.lease.count();
   std::int64_t heartbeat_ms = options.heartbeat.count();
   app.add_option("--state", options.state_dir, "folder of the state, created if need be")
@@ -103,6 +106,11 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   AddLimits(app, options.limits);
   app.add_option("--log", options.log_file, "log file [standard error]");
+  app.add_option(
+         "--exit-with-parent", parent,
+         "end when the parent process, of this id, ends; who shares the folder then goes on "
+         "without it")
+      ->check(CLI::PositiveNumber);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -112,6 +120,7 @@ int main(int argc, char** argv) {
     std::cerr << "--heartbeat-ms must be below --lease-ms\n";
     return 2;
   }
+  options.stays = parent < 0;
   options.lease = std::chrono::milliseconds(lease_ms);
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
 
@@ -122,6 +131,10 @@ int main(int argc, char** argv) {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
+  if (parent >= 0) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) return 0;  // it has ended already
+  }
   std::atomic<bool> failed = false;
   options.on_failure = [&failed](const absl::Status&) {
     failed = true;

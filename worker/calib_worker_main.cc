@@ -112,6 +112,9 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", once.output, "CSV file of --once [standard output]")->needs(spec);
   app.add_option("--vtk", once.vtk, "folder for the grains after each load step of --once")
       ->needs(spec);
+  app.add_option("--load-step", once.load_step, "--once ends there and draws no other")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(spec);
   app.add_option("--checkpoint", once.checkpoint,
                  "file to go on from after an interruption, renewed after each load step of --once")
       ->needs(spec);

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 #include <ostream>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -107,7 +108,7 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
     return kBadSpec;
   }
   Specimens specimens(FromFiles(*spec, options));
-  dem::Recording recording{.vtk_directory = options.vtk};
+  dem::Recording recording{.vtk_directory = options.vtk, .vtk_load_step = options.load_step};
   if (!options.checkpoint.empty()) {
     recording.resume_from = ReadFile(options.checkpoint).value_or("");
     recording.checkpoint = [&](const std::string& checkpoint) {
@@ -137,15 +138,21 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
   }
   out << '\n';
 
-  const auto write = [&out](const dem::State& state) {
+  std::stop_source far_enough;
+  const auto write = [&](const dem::State& state) {
     std::string row = std::to_string(state.load_step);
     for (const double value : state.values) {
       row += fmt::format(",{:.17g}", value);
     }
     out << row << std::endl;  // a reader sees each state when it is reached
+    if (state.load_step == options.load_step) {
+      far_enough.request_stop();  // looked at once this state has been drawn
+    }
   };
-  const v1::Finished finished = Evaluate(*spec, specimens, write, {}, recording);
-  if (finished.outcome() == v1::Finished::OUTCOME_COMPLETED) {
+  const v1::Finished finished =
+      Evaluate(*spec, specimens, write, far_enough.get_token(), recording);
+  if (finished.outcome() == v1::Finished::OUTCOME_COMPLETED ||
+      (finished.outcome() == v1::Finished::OUTCOME_STOPPED && far_enough.stop_requested())) {
     return kCompleted;
   }
   errors << finished.reason() << '\n';

@@ -2,6 +2,7 @@
 // One model evaluation without a server.
 
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +16,13 @@ struct OnceOptions {
   std::vector<std::string> meshes{};  ///< files that have the digests of the spec's meshes
   std::string output{};               ///< CSV file; empty: standard output
   std::string vtk{};                  ///< folder for grains; empty: none
+  std::optional<int> load_step{};     ///< the run ends there and draws no other; empty: all
   /// File that is replaced after each load step by what the run goes on from; when it is there, the
   /// run begins behind it. Empty: none.
   std::string checkpoint{};
 };
 
-inline constexpr int kCompleted = 0;  ///< exit code: all load steps were reached
+inline constexpr int kCompleted = 0;  ///< exit code: all load steps, or load_step, were reached
 inline constexpr int kDiverged = 1;   ///< exit code: the model cannot do it
 inline constexpr int kBadSpec = 2;    ///< exit code: the spec is unusable, or the run failed
 inline constexpr int kRefusedCheckpoint = 3;  ///< exit code: the checkpoint is of another run

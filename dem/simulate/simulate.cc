@@ -36,10 +36,13 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
   if (!recording.vtk_directory.empty()) {
     series.emplace(recording.vtk_directory);
   }
+  const auto is_drawn = [&](const State& state) {
+    return series && state.load_step == recording.vtk_load_step.value_or(state.load_step);
+  };
   const LoadStepSink reached = [&](const State& state, const Assembly* assembly) {
     sink(state);
-    return series && assembly != nullptr ? series->Add(*assembly, state.load_step)
-                                         : absl::OkStatus();
+    return is_drawn(state) && assembly != nullptr ? series->Add(*assembly, state.load_step)
+                                                  : absl::OkStatus();
   };
   const bool goes_on =
       FindTestEntry(scenario.test)->info.needs_packing;  // single bodies start anew
@@ -50,7 +53,7 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
     ASSIGN_OR_RETURN(RunCheckpoint checkpoint, UnpackCheckpoint(scenario, recording.resume_from));
     for (const State& state : checkpoint.states) {
       sink(state);
-      if (series) {
+      if (is_drawn(state)) {
         series->AddExisting(state.load_step);
       }
     }

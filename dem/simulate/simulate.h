@@ -2,6 +2,7 @@
 // The entrance to the engine: one run of a scenario.
 
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -15,6 +16,7 @@ namespace calib::dem {
 struct Recording {
   std::string vtk_directory{};  ///< for a series of grains, contacts and walls after each load step
                                 ///< (simulate/vtk_series.h); empty: none. `collision` writes none.
+  std::optional<int> vtk_load_step{};  ///< the only load step of that series; empty: all
   CheckpointSink checkpoint{};  ///< called after each point of the path, when its state has been
                                 ///< given to the sink; empty: no checkpoints. `collision` has none.
   std::string resume_from{};    ///< a checkpoint of this scenario: its states are given to the sink

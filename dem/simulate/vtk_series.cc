@@ -1,6 +1,7 @@
 #include "dem/simulate/vtk_series.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numeric>
@@ -107,6 +108,7 @@ VtkPiece GrainsOf(const Assembly& assembly, int load_step) {
 VtkPiece ContactsOf(const Assembly& assembly) {
   const NeighborList& list = assembly.neighbors();
   VtkPiece piece{.cells = VtkPiece::Cells::kLines};
+  std::vector<Vec3> forces;
   std::vector<double> normal;
   std::vector<double> tangential;
   for (int s = 0; s < list.size(); ++s) {
@@ -119,12 +121,38 @@ VtkPiece ContactsOf(const Assembly& assembly) {
     piece.points.push_back(from + branch);
     const Vec3 force = assembly.force_on_j(s);
     const Vec3 n = (1.0 / Length(branch)) * branch;
+    forces.push_back(force);
     normal.push_back(Dot(force, n));
     tangential.push_back(Length(force - normal.back() * n));
   }
   piece.connectivity = Counted(piece.points.size(), 0, 1);
   piece.offsets = Counted(normal.size(), 2, 2);
-  piece.cell_data = VtkArray("normal_force", normal) + VtkArray("tangential_force", tangential);
+  piece.cell_data = VtkArray("force", forces) + VtkArray("normal_force", normal) +
+                    VtkArray("tangential_force", tangential);
+  return piece;
+}
+
+/// No points where an axis is open.
+VtkPiece CellOf(const Assembly& assembly, int load_step) {
+  const PeriodicCell& cell = assembly.cell();
+  VtkPiece piece{.cells = VtkPiece::Cells::kLines};
+  if (cell.open[0] || cell.open[1] || cell.open[2]) {
+    return piece;
+  }
+  for (int corner = 0; corner < 8; ++corner) {  // bit a: at the far end along axis a
+    const double top = corner >> 2 & 1;
+    piece.points.push_back({(corner & 1) * cell.length[0] + top * cell.Tilt(),
+                            (corner >> 1 & 1) * cell.length[1], top * cell.length[2]});
+    for (const int axis : {1, 2, 4}) {
+      if ((corner & axis) == 0) {
+        piece.connectivity.insert(piece.connectivity.end(), {corner, corner | axis});
+      }
+    }
+  }
+  piece.offsets = Counted(12, 2, 2);
+  const std::array<double, 3>& stress = assembly.stress();
+  piece.field_data = VtkArray("load_step", std::vector<std::int32_t>{load_step}) +
+                     VtkArray("stress", std::vector<Vec3>{{stress[0], stress[1], stress[2]}});
   return piece;
 }
 
@@ -172,12 +200,15 @@ absl::Status VtkSeries::Add(const Assembly& assembly, int load_step) {
   std::filesystem::create_directories(directory_, error);
   RETURN_IF_ERROR(Write(grains_, load_step, GrainsOf(assembly, load_step)));
   RETURN_IF_ERROR(Write(contacts_, load_step, ContactsOf(assembly)));
+  if (const VtkPiece cell = CellOf(assembly, load_step); !cell.points.empty()) {
+    RETURN_IF_ERROR(Write(cell_, load_step, cell));
+  }
   const VtkPiece walls = WallsOf(assembly);
   return walls.points.empty() ? absl::OkStatus() : Write(walls_, load_step, walls);
 }
 
 void VtkSeries::AddExisting(int load_step) {
-  for (Series* series : {&grains_, &contacts_, &walls_}) {
+  for (Series* series : {&grains_, &contacts_, &cell_, &walls_}) {
     const VtkSeriesEntry entry = EntryOf(*series, load_step);
     std::error_code error;
     if (std::filesystem::exists(absl::StrCat(directory_, "/", entry.file), error)) {

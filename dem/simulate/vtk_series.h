@@ -10,14 +10,18 @@
 
 namespace calib::dem {
 
-/// Three series in one folder, each a PVD that names its files with their load steps as time:
+/// Series in one folder, each a PVD that names its files with their load steps as time:
 ///   grains.pvd    grains_NNNN.vtu    a vertex per grain in the order of the packing: id,
 ///                                    radius [m], velocity [m/s], angular_velocity [rad/s],
 ///                                    coordination_number (contacts with grains), clump where
 ///                                    there are some (-1: none); field data load_step,
 ///                                    cell_length [m], cell_tilt [m]
 ///   contacts.pvd  contacts_NNNN.vtp  a line per contact of grains from centre to centre:
-///                                    normal_force (compression positive), tangential_force [N]
+///                                    force on the grain at its end, as a vector; normal_force
+///                                    (compression positive), tangential_force [N]
+///   cell.pvd      cell_NNNN.vtp      the edges of the periodic cell; field data load_step, stress:
+///                                    Love-Weber along x, y, z, compression positive [Pa]; only
+///                                    where the cell is closed on all sides
 ///   walls.pvd     walls_NNNN.vtp     the triangles of walls that are meshes; only with such walls
 /// Centres are wrapped into the periodic cell. Every file appears as a whole, and a PVD names only
 /// files that are there, so that a run can be looked at while it goes on. Not thread-safe.
@@ -44,6 +48,7 @@ class VtkSeries {
   std::string directory_;
   Series grains_{"grains", "vtu"};
   Series contacts_{"contacts", "vtp"};
+  Series cell_{"cell", "vtp"};
   Series walls_{"walls", "vtp"};
 };
 

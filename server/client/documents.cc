@@ -130,11 +130,7 @@ absl::StatusOr<std::string> SamplesDocument(Client& client, const std::string& c
                                             CampaignShelf* shelf) {
   ASSIGN_OR_RETURN(const auto samples, client.GetSamples(campaign));
   ASSIGN_OR_RETURN(const auto read, ReadCampaign(client, campaign, shelf));
-  std::vector<std::string> names;
-  for (const campaign::CalibratedParameter& parameter : read->parameters) {
-    names.push_back(parameter.name);
-  }
-  return report::SamplesJson(campaign, names, samples);
+  return report::SamplesJson(campaign, read->parameters, samples);
 }
 
 absl::StatusOr<std::string> StatesDocument(Client& client, const std::string& campaign,

@@ -50,6 +50,9 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
     arguments.insert(arguments.end(), {"--checkpoint", task.checkpoint});
   }
   if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});
+  if (task.load_step) {
+    arguments.insert(arguments.end(), {"--load-step", std::to_string(*task.load_step)});
+  }
   ASSIGN_OR_RETURN(auto process, client::ChildProcess::Start(program, arguments, folder + "/log"));
   return Evaluation(std::move(process), folder);
 }

@@ -1,6 +1,7 @@
 #pragma once
 // One model evaluation by a calib-worker without a server.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ class Evaluation {
     std::string packing;              ///< text of the packing file; empty with a recipe
     std::vector<std::string> meshes;  ///< contents of the STL files
     std::string vtk;                  ///< folder for grains; empty: none
+    std::optional<int> load_step;     ///< it ends there and draws no other; empty: all
     std::string checkpoint;           ///< file to go on from and to renew; empty: none
   };
   /// folder: an existing folder for the files in between.

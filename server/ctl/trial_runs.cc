@@ -13,8 +13,8 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/model/campaign.h"
 #include "server/campaign/model/sha256.h"
+#include "server/client/temporary_folder.h"
 #include "server/ctl/evaluation.h"
-#include "server/ctl/temporary_folder.h"
 #include "server/messages/attempt_spec.h"
 
 namespace calib::ctl {
@@ -106,7 +106,7 @@ double TrialStress() { return kTrialStress; }
 
 TrialRuns MakeTrialRuns(const std::string& program) {
   TrialRuns runs;
-  const auto folder = TemporaryFolder::Make();
+  const auto folder = client::TemporaryFolder::Make();
   if (!folder.ok()) {
     runs.failure = std::string(folder.status().message());
     return runs;

@@ -26,6 +26,7 @@ namespace calib::ctl {
   VERB(Predict)           \
   VERB(Report)            \
   VERB(Export)            \
+  VERB(Vtk)               \
   VERB(Pause)             \
   VERB(Resume)            \
   VERB(Cancel)            \

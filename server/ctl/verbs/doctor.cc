@@ -19,8 +19,8 @@
 #include "server/access/certificate.h"
 #include "server/client/child_process.h"
 #include "server/client/session.h"
+#include "server/client/temporary_folder.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/temporary_folder.h"
 #include "server/ctl/trial_runs.h"
 #include "server/ctl/verb.h"
 #include "server/messages/folder_report.h"
@@ -49,7 +49,7 @@ struct Worker {
 };
 Worker AskWorker(const std::string& program) {
   Worker worker;
-  const auto folder = TemporaryFolder::Make();
+  const auto folder = client::TemporaryFolder::Make();
   if (!folder.ok()) return worker;
   const std::string log = folder->path() + "/version";
   auto process = client::ChildProcess::Start(program, {"--version"}, log);

@@ -36,10 +36,6 @@ std::string CampaignFile(const v1::CampaignSource& source) {
 
 std::vector<std::pair<std::string, std::string>> Files(const report::CampaignView& view) {
   const auto predictions = report::PredictReadings(view);
-  std::vector<std::string> names;
-  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters) {
-    names.push_back(parameter.name);
-  }
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
@@ -50,7 +46,7 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
                      view.posterior, view.campaign.parameters,
                      report::ShapeOf(view.posterior, view.campaign.parameters, view.samples))},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},
-          {"samples.json", report::SamplesJson(id, names, view.samples)},
+          {"samples.json", report::SamplesJson(id, view.campaign.parameters, view.samples)},
           {"samples.csv", report::SamplesCsv(view)},
           {"states.csv", report::StatesCsv(view)},
           {"data.json", report::DataJson(view.campaign)},

@@ -478,14 +478,18 @@ std::string LineageJson(const std::string& campaign, const std::vector<Branch>& 
   return Dump({{"campaign", campaign}, {"nodes", nodes}});
 }
 
-std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+std::string SamplesJson(const std::string& campaign,
+                        std::span<const campaign::CalibratedParameter> parameters,
                         const std::vector<v1::Sample>& samples) {
+  Json units = Json::object();
+  for (const campaign::CalibratedParameter& p : parameters) units[p.name] = p.unit;
   Json list = Json::array();
   for (const v1::Sample& s : samples) {
     Json values = Json::object();
     for (int k = 0; k < s.parameters_size(); ++k) {
       const auto index = static_cast<std::size_t>(k);
-      values[index < parameters.size() ? parameters[index] : std::to_string(k)] = s.parameters(k);
+      values[index < parameters.size() ? parameters[index].name : std::to_string(k)] =
+          s.parameters(k);
     }
     list.push_back({{"index", s.index()},
                     {"iteration", s.iteration()},
@@ -497,7 +501,7 @@ std::string SamplesJson(const std::string& campaign, const std::vector<std::stri
                     {"attempts", s.attempts()},
                     {"purpose", s.purpose()}});
   }
-  return Dump({{"campaign", campaign}, {"samples", list}});
+  return Dump({{"campaign", campaign}, {"units", units}, {"samples", list}});
 }
 
 std::string StatesJson(const std::string& campaign, int sample,

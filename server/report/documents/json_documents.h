@@ -46,8 +46,9 @@ std::string ShownJson(const Shown& shown);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
 /// family: of the campaign, with the depth of each.
 std::string LineageJson(const std::string& campaign, const std::vector<Branch>& family);
-/// parameters: names in the order of each sample's values.
-std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+/// parameters: in the order of each sample's values.
+std::string SamplesJson(const std::string& campaign,
+                        std::span<const campaign::CalibratedParameter> parameters,
                         const std::vector<v1::Sample>& samples);
 std::string StatesJson(const std::string& campaign, int sample,
                        const std::map<std::string, StateHistory>& by_experiment);

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/ctl/temporary_folder.h"
+#include "server/client/temporary_folder.h"
 
 namespace calib::ctl {
 namespace {
@@ -27,7 +27,7 @@ std::ptrdiff_t FilesIn(const std::string& folder) {
 }
 
 TEST(OutputFile, AnEarlierFileStaysUntilTheNewOneIsWhole) {
-  const auto folder = TemporaryFolder::Make();
+  const auto folder = client::TemporaryFolder::Make();
   ASSERT_TRUE(folder.ok());
   const std::string path = folder->path() + "/states.csv";
   ASSERT_TRUE(WriteFile(path, "old").ok());
@@ -46,7 +46,7 @@ TEST(OutputFile, AnEarlierFileStaysUntilTheNewOneIsWhole) {
 }
 
 TEST(OutputFile, ALinkStaysALink) {
-  const auto folder = TemporaryFolder::Make();
+  const auto folder = client::TemporaryFolder::Make();
   ASSERT_TRUE(folder.ok());
   const std::string path = folder->path() + "/states.csv";
   ASSERT_TRUE(WriteFile(path, "old").ok());
@@ -59,7 +59,7 @@ TEST(OutputFile, ALinkStaysALink) {
 }
 
 TEST(OutputFile, WhereNothingCanBeWrittenIsKnownAtOnce) {
-  const auto folder = TemporaryFolder::Make();
+  const auto folder = client::TemporaryFolder::Make();
   ASSERT_TRUE(folder.ok());
   const std::string missing = folder->path() + "/none/states.csv";
   EXPECT_THAT(std::string(OutputFile::Open(missing).status().message()),

@@ -92,6 +92,7 @@ TEST_F(Vtk, GrainsComeBackBitForBitInTheOrderOfThePacking) {
   EXPECT_THAT(Collection("grains.pvd"),
               ElementsAre(std::pair(0, "grains_0000.vtu"), std::pair(1, "grains_0001.vtu"),
                           std::pair(2, "grains_0002.vtu")));
+  EXPECT_EQ(Collection("cell.pvd").size(), 3U);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "walls.pvd"));
   for (int step = 0; step < 3; ++step) {
     const ptree grid = Read("grains_000" + std::to_string(step) + ".vtu", "UnstructuredGrid");
@@ -144,12 +145,14 @@ TEST_F(Vtk, ContactsCarryTheMeanStress) {
   scenario.packing = test::SmallPacking(200);
   scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.02, .load_step = 1}};
   VtkSeries series(folder_.string());
-  std::vector<double> trace;
+  std::vector<double> trace, shear, tilt;
   const auto summary = SimulateGrains(
       scenario,
       [&](const State& state, const Assembly& assembly) {
         const auto& stress = assembly.stress();
         trace.push_back((stress[0] + stress[1] + stress[2]) * assembly.cell().Volume());
+        shear.push_back(assembly.shear_stress() * assembly.cell().Volume());
+        tilt.push_back(assembly.cell().Tilt());
         return series.Add(assembly, state.load_step);
       },
       {});
@@ -161,16 +164,24 @@ TEST_F(Vtk, ContactsCarryTheMeanStress) {
     const auto at = Values<double>(piece.get_child("Points"), "points");
     const auto force = Values<double>(piece.get_child("CellData"), "normal_force");
     const auto friction = Values<double>(piece.get_child("CellData"), "tangential_force");
+    const auto vector = Values<double>(piece.get_child("CellData"), "force");
     EXPECT_EQ(piece.get<std::size_t>("<xmlattr>.NumberOfLines"), force.size());
     EXPECT_EQ(Values<std::int64_t>(piece.get_child("Lines"), "connectivity").size(),
               2 * force.size());
     double sum = 0;
+    double sheared = 0;
     for (std::size_t c = 0; c < force.size(); ++c) {
       const double* const from = &at[6 * c];
+      sheared -=
+          0.5 * (vector[3 * c] * (from[5] - from[2]) + vector[3 * c + 2] * (from[3] - from[0]));
       sum += force[c] * std::hypot(from[3] - from[0], from[4] - from[1], from[5] - from[2]);
       EXPECT_LE(friction[c], (0.55 + 1e-9) * force[c]);
     }
     EXPECT_NEAR(sum, trace[step], 1e-9 * trace[step]);
+    EXPECT_NEAR(sheared, shear[step], 1e-9 * trace[step]);
+    const ptree cell = Read("cell_000" + std::to_string(step) + ".vtp", "PolyData");
+    const auto corners = Values<double>(cell.get_child("Piece.Points"), "points");
+    EXPECT_NEAR(corners[12], tilt[step], 1e-15) << "the first corner of the top";
   }
 }
 
@@ -229,6 +240,7 @@ TEST_F(Vtk, ASiloShowsTheGrainsThatAreLeftAndItsWalls) {
   ASSERT_TRUE(summary.ok()) << summary.status();
   ASSERT_EQ(summary->outcome, Outcome::kCompleted) << summary->reason;
   EXPECT_THAT(Collection("walls.pvd"), ElementsAre(std::pair(4, "walls_0004.vtp")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "cell.pvd")) << "a silo is open above";
   const ptree grains = Read("grains_0004.vtu", "UnstructuredGrid").get_child("Piece");
   const auto left = Values<std::int32_t>(grains.get_child("PointData"), "id");
   EXPECT_GT(left.size(), 0U);

@@ -1,4 +1,4 @@
-#include "server/ctl/temporary_folder.h"
+#include "server/client/temporary_folder.h"
 
 #include <cerrno>
 #include <cstdlib>
@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 
-namespace calib::ctl {
+namespace calib::client {
 
 absl::StatusOr<TemporaryFolder> TemporaryFolder::Make() {
   std::error_code error;
@@ -29,4 +29,4 @@ TemporaryFolder::~TemporaryFolder() {
   if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
 }
 
-}  // namespace calib::ctl
+}  // namespace calib::client

@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 
-namespace calib::ctl {
+namespace calib::client {
 
 class TemporaryFolder {
  public:
@@ -22,4 +22,4 @@ class TemporaryFolder {
   std::string path_;
 };
 
-}  // namespace calib::ctl
+}  // namespace calib::client
