@@ -6,10 +6,12 @@ cores=$(nproc)
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
-# need FILE...: installs the packages listed in the files that are not installed yet (root, or sudo).
+# need FILE...: installs the packages listed in the files that are not installed yet (root, or sudo). Node.js from elsewhere,
+# which brings npm along and does not go with Debian's, counts as both.
 need() {
   local missing=() name
   while read -r name; do
+    case $name in nodejs | npm) command -v node >/dev/null && command -v npm >/dev/null && continue ;; esac
     dpkg-query -W -f='${db:Status-Status}' "$name" 2>/dev/null | grep -qx installed || missing+=("$name")
   done < <(cat "$@" | sed 's/#.*//' | tr -d ' \t' | grep -v '^$')
   [ ${#missing[@]} -eq 0 ] && return 0

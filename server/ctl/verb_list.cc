@@ -38,6 +38,7 @@ namespace calib::ctl {
   VERB(Tests)             \
   VERB(Contacts)          \
   VERB(Schema)            \
+  VERB(New)               \
   VERB(Pack)              \
   VERB(Certs)
 
