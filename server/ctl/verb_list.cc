@@ -35,7 +35,9 @@ namespace calib::ctl {
   VERB(Tests)             \
   VERB(Contacts)          \
   VERB(Pack)              \
-  VERB(Certs)
+  VERB(Certs)             \
+  VERB(Completion)        \
+  VERB(Man)
 
 #define CALIB_DECLARE_VERB(name) Verb name##Verb();
 CALIB_VERBS(CALIB_DECLARE_VERB)
