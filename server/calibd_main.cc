@@ -17,6 +17,7 @@
 namespace {
 
 constexpr std::chrono::seconds kShutdown{5};
+constexpr const char* kOwnSocket = "unix:";
 
 /// Options for how much the server takes.
 void AddLimits(CLI::App& app, calib::service::Limits& limits) {
@@ -80,8 +81,11 @@ int main(int argc, char** argv) {
   app.add_option("--state", options.state_dir, "folder of the state, created if need be")
       ->required();
   app.add_option("--listen", options.listen,
-                 "HOST:PORT, port 0 for a free one (DIR/server.json tells which), or unix:/PATH")
-      ->check([](const std::string& address) { return calib::rpc::ProblemOfAddress(address, 0); })
+                 "HOST:PORT, port 0 for a free one (DIR/server.json tells which), unix:/PATH, or "
+                 "unix: for a socket that this account alone reaches")
+      ->check([](const std::string& address) {
+        return address == kOwnSocket ? "" : calib::rpc::ProblemOfAddress(address, 0);
+      })
       ->capture_default_str();
   app.add_option(
          "--tls", options.tls,
@@ -121,6 +125,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   options.stays = parent < 0;
+  if (options.listen == kOwnSocket) options.listen.clear();
   options.lease = std::chrono::milliseconds(lease_ms);
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
 

@@ -11,7 +11,10 @@
 #include <vector>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
+#include "proto/rpc/digest.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/file/text/utf8.h"
 #include "server/ctl/exit_codes.h"
@@ -35,6 +38,12 @@ constexpr const char* kErrorMeans =
     "  fitted, held out   of the model at its posterior, by the role of the experiments\n"
     "  of the best fit    of the point of the parameter space that comes closest (diagnose)\n"
     "  with an effect     of the best fit with it alone";
+
+// As that of calib-worker, in lines.
+std::string VersionText() {
+  return absl::StrCat("calibctl ", CALIB_VERSION, "\nmechanics ", dem::EngineVersion(),
+                      "\ncatalogue ", rpc::Sha256Hex(dem::CatalogText()));
+}
 
 // What stands where the verb should, if it is none; the values of options before it are passed
 // over.
@@ -89,6 +98,32 @@ void AddCommonOptions(CLI::App& app, CommonOptions& common) {
                  "local workers beside the embedded server (run: all cores unless given)")
       ->check(CLI::Range(0, 1024));
   app.add_flag("--json", common.json, "one JSON document on standard output");
+  app.set_version_flag("--version", VersionText(),
+                       "version, mechanics and catalogue of this build");
+}
+
+void MakeApp(const std::vector<Verb>& verbs, CLI::App& app, CommonOptions& common,
+             std::optional<Verb>& chosen) {
+  app.require_subcommand(1);
+  app.fallthrough();  // common options may stand behind the verb too
+  app.get_formatter()->column_width(28);
+  AddCommonOptions(app, common);
+  for (const Verb& verb : verbs) AddVerb(verb, app, chosen);
+}
+
+std::vector<OptionEntry> OptionsOf(const CLI::App& app) {
+  std::vector<OptionEntry> entries;
+  for (const CLI::Option* option : app.get_options()) {
+    OptionEntry entry{.help = option->get_description(),
+                      .at_its_place = option->get_positional(),
+                      .takes_value = option->get_items_expected_max() > 0,
+                      .required = option->get_required()};
+    if (entry.at_its_place) entry.names.push_back(option->get_name(/*positional=*/true));
+    for (const std::string& name : option->get_snames()) entry.names.push_back("-" + name);
+    for (const std::string& name : option->get_lnames()) entry.names.push_back("--" + name);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
 }
 
 }  // namespace
@@ -104,15 +139,9 @@ Parsed ParseCommandLine(const std::vector<Verb>& verbs, int argc, const char* co
   CommonOptions common;
   std::optional<Verb> chosen;
   CLI::App app{kDescription, "calibctl"};
-  app.require_subcommand(1);
-  app.fallthrough();  // common options may stand behind the verb too
-  app.get_formatter()->column_width(28);
-  AddCommonOptions(app, common);
+  MakeApp(verbs, app, common, chosen);
   std::vector<std::string> names;
-  for (const Verb& verb : verbs) {
-    AddVerb(verb, app, chosen);
-    names.push_back(verb.help.name);
-  }
+  for (const Verb& verb : verbs) names.push_back(verb.help.name);
   if (const auto word = UnknownVerb(names, argc, argv)) {
     std::cerr << "calibctl: " << campaign::Quoted(*word) << " is not a command; "
               << campaign::Suggestion(*word, names) << "\n";
@@ -124,6 +153,24 @@ Parsed ParseCommandLine(const std::vector<Verb>& verbs, int argc, const char* co
     return {std::nullopt, app.exit(error) == 0 ? kDone : kBadInput};
   }
   return {Command{*std::move(chosen), std::move(common)}, kDone};
+}
+
+CommandTree DescribeCommands(const std::vector<Verb>& verbs) {
+  CommonOptions common;
+  std::optional<Verb> chosen;
+  CLI::App app{kDescription, "calibctl"};
+  MakeApp(verbs, app, common, chosen);
+  CommandTree tree{.version = VersionText(), .common = OptionsOf(app)};
+  for (const Verb& verb : verbs) {
+    VerbEntry entry{
+        .name = verb.help.name, .description = verb.help.description, .example = verb.help.example};
+    for (OptionEntry& option : OptionsOf(*app.get_subcommand(verb.help.name))) {
+      const bool is_help = option.names.back() == "--help";  // common to all
+      if (!is_help) entry.options.push_back(std::move(option));
+    }
+    tree.verbs.push_back(std::move(entry));
+  }
+  return tree;
 }
 
 }  // namespace calib::ctl

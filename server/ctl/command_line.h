@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/ctl/shell/command_tree.h"
 #include "server/ctl/verb.h"
 
 namespace calib::ctl {
@@ -23,5 +24,8 @@ struct Parsed {
 /// Reads a command line with one of `verbs`; writes help to standard output and what is wrong to
 /// standard error.
 Parsed ParseCommandLine(const std::vector<Verb>& verbs, int argc, const char* const* argv);
+
+/// The same command line, for completions and man pages.
+CommandTree DescribeCommands(const std::vector<Verb>& verbs);
 
 }  // namespace calib::ctl

@@ -40,7 +40,9 @@ namespace calib::ctl {
   VERB(Schema)            \
   VERB(New)               \
   VERB(Pack)              \
-  VERB(Certs)
+  VERB(Certs)             \
+  VERB(Completion)        \
+  VERB(Man)
 
 #define CALIB_DECLARE_VERB(name) Verb name##Verb();
 CALIB_VERBS(CALIB_DECLARE_VERB)

@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < { scheduler report/plot } < { service report/html } < report/documents < client < { page diagnosis inspection } < ctl < ctl/verbs < .
+           < { scheduler report/plot } < { service report/html } < report/documents < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;

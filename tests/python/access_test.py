@@ -94,6 +94,14 @@ def test_a_server_that_is_not_the_one_is_not_taken(daemon: Start, tmp_path: Path
         calib.connect(server.address, tls=ana)
 
 
+def test_a_state_folder_wants_neither_certificate_nor_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CALIB_TLS", str(certificate(tmp_path, "viewer", "vito")))
+    monkeypatch.setenv("CALIB_TOKEN", "0" * 64)
+    with calib.connect(state=tmp_path / "state", programs=PROGRAMS, workers=1) as client:
+        assert client.address.startswith("unix:/")
+        assert client.wait(client.submit(small_campaign(tmp_path, samples=2, iterations=1)))["samples_done"] == 2
+
+
 def test_a_folder_that_is_no_certificate_is_said(tmp_path: Path) -> None:
     with pytest.raises(calib.BadInput, match="ca.pem cannot be read: No such file or directory"):
         calib.connect("127.0.0.1:9", tls=tmp_path)

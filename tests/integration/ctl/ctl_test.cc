@@ -87,7 +87,7 @@ TEST_F(Calibctl, RowsAreRunAndNothingIsInferred) {
   const Answer run = Call("run rows.yaml --state s --workers 1");
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("2 rows run, 2 model evaluations, nothing inferred."));
-  EXPECT_EQ(Call("samples c1 --state s --json").json().size(), 2U);
+  EXPECT_EQ(Call("samples c1 --state s --json").json()["samples"].size(), 2U);
   for (const char* verb : {"posterior", "compare", "diagnose", "improve"}) {
     const Answer answer = Call(std::string(verb) + " c1 --state s");
     EXPECT_EQ(answer.code, 1) << verb;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -144,7 +146,8 @@ TEST(CommandLine, EveryVerbIsThereOnceAndShowsHelp) {
     EXPECT_NE(::testing::internal::GetCapturedStdout().find("calibctl " + verb.help.example),
               std::string::npos);
   }
-  EXPECT_EQ(names.size(), 31);
+  const std::filesystem::directory_iterator files(CALIB_VERBS);
+  EXPECT_EQ(static_cast<std::ptrdiff_t>(names.size()), std::distance(begin(files), end(files)));
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
 }

@@ -95,14 +95,14 @@ class Service:
     """calibd over a state folder, and its workers, as children of this process."""
 
     def __init__(self, state: Path, folder: Path | None) -> None:
-        """Starts calibd on a free port of 127.0.0.1. Conflict, with its sentence: another process serves the folder."""
+        """Starts calibd on a socket that this account alone reaches. Conflict, with its sentence: another process serves the folder."""
         self._state = state
         self._folder = folder
         self._workers: list[subprocess.Popen[bytes]] = []
         program = find_program("calibd", folder)
         environment = {name: value for name, value in os.environ.items() if name != "CALIB_TLS"}
         self._server = subprocess.Popen(
-            [program, "--state", state, "--listen", "127.0.0.1:0", "--log", state / "server.log", "--exit-with-parent",
+            [program, "--state", state, "--listen", "unix:", "--log", state / "server.log", "--exit-with-parent",
              str(os.getpid())],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment)
         self.address = self._wait_for_address()
@@ -133,8 +133,7 @@ class Service:
             with (self._state / f"worker-{i}.log").open("ab") as log:
                 self._workers.append(subprocess.Popen(
                     [program, "--server", self.address, "--slots", "1", "--name", f"python-{os.getpid()}-{i}",
-                     "--checkpoints", self._state / "checkpoints", "--token", self._state / "token", "--exit-with-parent",
-                     str(os.getpid())],
+                     "--checkpoints", self._state / "checkpoints", "--exit-with-parent", str(os.getpid())],
                     stdin=subprocess.DEVNULL, stdout=log, stderr=log))
 
     def close(self) -> None:
