@@ -408,6 +408,7 @@ class Relations {
           absl::StrCat(voids->name, " and ", volume->name, " agree: -de/d", volume->name,
                        " is 1 + e0 with e0 = ", Short(line.at_zero)));
       StrainMeasure(ev, e);
+      no_lateral_strain_ = oedometer;
     } else if (oedometer) {
       return;  // lateral strain is free, and nothing is known of it
     } else if (is(-1)) {
@@ -586,6 +587,14 @@ class Relations {
       }
     }
     if (path_known_) return;
+    const std::vector<double> ea = Of("axial_strain");
+    const std::vector<double> ev = Of("volumetric_strain");
+    if (!ea.empty() && !ev.empty() && Apart(ea, ev) < kHolds) no_lateral_strain_ = true;
+    if (no_lateral_strain_) {
+      p->evidence.emplace_back("by its name; without lateral strain the path tells nothing of it");
+      return;
+    }
+    const Line whole = LineThrough(mean, deviator);
     std::size_t peak = 0;
     for (std::size_t i = 0; i < deviator.size(); ++i) {
       if (std::isnan(deviator[i])) continue;
@@ -614,7 +623,8 @@ class Relations {
       Say(FindingKind::kStressPath, false,
           absl::StrCat("dq/dp = ", Short(line.slope), ": ", Quoted(p->name),
                        " is (axial + lateral stress)/2, not the mean stress"));
-    } else if (is(1) && !Said(*p)) {
+    } else if (is(1) && whole.left < kHolds && !Said(*p)) {
+      // With a held lateral stress unloading goes back along the same line.
       Open(
           *p, {"axial_stress", "nothing"},
           absl::StrCat("d", q->name, "/d", p->name, " = ", Short(line.slope), ": ", Quoted(p->name),
@@ -721,6 +731,7 @@ class Relations {
   std::size_t test_;
   bool volume_known_ = false;
   bool path_known_ = false;
+  bool no_lateral_strain_ = false;  // an oedometer, whose lateral stress is free
 };
 
 }  // namespace

@@ -32,6 +32,17 @@ TEST(Relations, ThePathSaysWhichMeanStressPIs) {
   }
 }
 
+// Without lateral strain the lateral stress is not held, and a slope of one is any earth pressure.
+TEST(Relations, ThePathOfAnOedometerSaysNothingOfP) {
+  const Inspection inspection =
+      InspectText(With("eps1 [%],q [kPa],p [kPa],e", [](const KnownTest& t, std::size_t i) {
+        const double p = 100 + 5e4 * t.ea[i];
+        return absl::StrCat(t.ea[i] * 100, ",", p - 60, ",", p, ",", 0.7 - 1.7 * t.ea[i]);
+      }));
+  EXPECT_NE(inspection.Find("mean_stress"), nullptr);
+  EXPECT_FALSE(inspection.IsOpen());
+}
+
 TEST(Relations, VoidsTellPercentFromPlainNumbers) {
   for (const double scale : {1.0, 100.0}) {
     const Inspection inspection =

@@ -31,7 +31,8 @@ TEST(TerminalPlot, KeepsToItsWidthInEveryStyle) {
     for (const bool utf8 : {false, true}) {
       const std::string plot = TerminalPlot(curves, {.x = "axial strain [percent]", .y = "q [kPa]"},
                                             {.columns = columns, .utf8 = utf8});
-      for (const std::string line : absl::StrSplit(plot, '\n')) {
+      const std::vector<std::string> lines = absl::StrSplit(plot, '\n');
+      for (const std::string& line : lines) {
         EXPECT_LE(Signs(line), columns) << line;
       }
     }
