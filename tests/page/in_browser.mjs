@@ -17,6 +17,9 @@ const folder = mkdtempSync(join(tmpdir(), "calib-page-"));
 const state = join(folder, "state");
 const kHostile = `<img src=x onerror="document.title='broken in'"> & "sand"`;
 
+// Three effects are thought of: ten times faster than all.
+const kRace = ["viscous_damping", "hertz_nonlinearity", "contact_plasticity"];
+
 // A dashpot that the model does not know, measured to 3 %; a faster impact held out.
 const campaign = (name, effects, fixed) => `name: ${JSON.stringify(name)}
 model: {contact: hertz_mindlin, effects: [${effects}], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25${fixed}}}
@@ -122,7 +125,8 @@ async function main() {
 
   // Improved in the meantime: the conclusions appear in a view that is open.
   await goTo(tab, "#/c1/missing");
-  const improving = calibctl(...asked, "improve", "c1", "--json");
+  const others = JSON.parse(await calibctl("effects", "--json")).map(({ name }) => name).filter((name) => !kRace.includes(name));
+  const improving = calibctl(...asked, "improve", "c1", "--json", ...others.flatMap((name) => ["--without", name]));
   for (const name of ["progress", "fit", "misfit", "parameters"]) await assertView(tab, "c1", name);
   await goTo(tab, "#/c1/missing");
   await improving;
