@@ -17,6 +17,9 @@ const folder = mkdtempSync(join(tmpdir(), "calib-page-"));
 const state = join(folder, "state");
 const kHostile = `<img src=x onerror="document.title='broken in'"> & "sand"`;
 
+// Three effects are thought of: ten times faster than all.
+const kRace = ["viscous_damping", "hertz_nonlinearity", "contact_plasticity"];
+
 // A dashpot that the model does not know, measured to 3 %; a faster impact held out.
 const campaign = (name, effects, fixed) => `name: ${JSON.stringify(name)}
 model: {contact: hertz_mindlin, effects: [${effects}], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25${fixed}}}
@@ -78,6 +81,9 @@ async function stop(child) {
   children.delete(child);
 }
 
+const begun = Date.now();
+const say = (what) => console.log(`${((Date.now() - begun) / 1000).toFixed(1)} s  ${what}`);
+
 async function main() {
   const { puppeteer, axe } = tools(modules);
   await measure();
@@ -97,9 +103,7 @@ async function main() {
   // No token, no page; with it once, and never seen again.
   const opened = await openTab(browser, origin);
   const { tab } = opened;
-  opened.expectLoss(true);
-  assert.equal((await tab.goto(`${origin}/`)).status(), 401);
-  opened.expectLoss(false);
+  assert.equal((await fetch(`${origin}/`)).status, 401);
   await tab.goto(`${origin}/?token=${token}`);
   assert.ok(!tab.url().includes(token), "the token has left the address");
   await until("the empty list says what will appear", () => tab.evaluate(() => /calibctl submit/.test(document.querySelector(".empty")?.textContent ?? "")));
@@ -117,13 +121,18 @@ async function main() {
   }, 90);
   assert.ok(seen.size > 1, `more than its end was seen: ${[...seen]}`);
 
+  say("watched to the end");
+
   // Improved in the meantime: the conclusions appear in a view that is open.
   await goTo(tab, "#/c1/missing");
-  const improving = calibctl(...asked, "improve", "c1", "--json");
+  const others = JSON.parse(await calibctl("effects", "--json")).map(({ name }) => name).filter((name) => !kRace.includes(name));
+  const improving = calibctl(...asked, "improve", "c1", "--json", ...others.flatMap((name) => ["--without", name]));
   for (const name of ["progress", "fit", "misfit", "parameters"]) await assertView(tab, "c1", name);
   await goTo(tab, "#/c1/missing");
   await improving;
   await until("the diagnosis appears by itself", () => tab.evaluate(() => document.querySelector(".verdict") !== null));
+
+  say("diagnosed and improved");
 
   // Every view, in both lights, on a desk and on a telephone.
   for (const [scheme, width] of [["light", 1280], ["dark", 1280], ["light", 360], ["dark", 2560]]) {
@@ -145,6 +154,7 @@ async function main() {
     assert.deepEqual(other.wrong, []);
     assert.deepEqual(await other.violations(), []);
     await other.tab.close();
+    say(`looked at, ${scheme}, ${width} px`);
   }
 
   await assertTakenAlong(tab, "c1");
@@ -174,10 +184,9 @@ async function main() {
   await stop(server);
 }
 
-const begun = Date.now();
 try {
   await main();
-  console.log(`in_browser: watched, improved and looked at in ${Math.round((Date.now() - begun) / 1000)} s; pictures in ${pictures}`);
+  say(`all as it should be; pictures in ${pictures}`);
 } finally {
   for (const child of children) child.kill("SIGKILL");
   rmSync(folder, { recursive: true, force: true });
