@@ -13,6 +13,7 @@
 #include "server/inspection/header_words.h"
 #include "server/inspection/numbers.h"
 #include "server/inspection/relations.h"
+#include "server/inspection/units.h"
 
 namespace calib::inspection {
 namespace {

@@ -1,15 +1,10 @@
 #pragma once
-// What physics ties the columns of a file to each other, and what follows from it for their units,
-// signs and names.
+// What physics ties the columns of a file to each other, and what follows from it for their signs
+// and names.
 
 #include "server/inspection/inspection.h"
 
 namespace calib::inspection {
-
-/// Factor of each column whose role is known: by its unit; without one by what it can be at all
-/// (a strain is below one), by what ties it to another column, by the columns of its kind. Where
-/// two units are left the column stays open.
-void DecideUnits(Inspection& inspection);
 
 /// Identities of the largest test, in SI: of stresses q = sa - sr, p = (sa + 2 sr)/3, effective =
 /// total - pore pressure, dq/dp = 3 (mean stress), 2 (half sum) where the lateral stress is held;
