@@ -32,7 +32,9 @@ class Answers {
   using Then = std::function<void(const absl::StatusOr<Kept>&)>;
 
   Answers(const Connect& connect, std::function<void(std::function<void()>)> post)
-      : post_(std::move(post)), quick_(connect, kQuickThreads), slow_(connect, kSlowThreads) {}
+      : post_(std::move(post)),
+        quick_(connect, kQuickThreads, 0),
+        slow_(connect, kSlowThreads, kSlowNiceness) {}
 
   /// stamp: tells what the document depends on; what was found at an equal one is given at once,
   /// and who asks while it is being found waits for that. Empty: it is found anew, and kept for
@@ -41,7 +43,8 @@ class Answers {
 
  private:
   static constexpr int kQuickThreads = 2;
-  static constexpr int kSlowThreads = 1;  // comparisons, which take up to seconds
+  static constexpr int kSlowThreads = 1;   // comparisons, which take up to seconds
+  static constexpr int kSlowNiceness = 5;  // what the service does for workers goes first
   static constexpr std::size_t kMostBytes = 64 << 20;
 
   struct Entry {

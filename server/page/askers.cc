@@ -9,12 +9,11 @@ namespace calib::page {
 namespace {
 
 constexpr std::size_t kMostWaiting = 256;
-/// Of nice(1): what the service does for workers and programs goes first.
-constexpr int kNiceness = 10;
 
 }  // namespace
 
-Askers::Askers(Connect connect, int threads) : connect_(std::move(connect)) {
+Askers::Askers(Connect connect, int threads, int niceness)
+    : connect_(std::move(connect)), niceness_(niceness) {
   for (int i = 0; i < threads; ++i) {
     threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
   }
@@ -34,7 +33,7 @@ bool Askers::Ask(Work work) {
 }
 
 void Askers::Run(const std::stop_token& stop) {
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness);
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), niceness_);
   std::unique_ptr<client::Client> client;
   while (true) {
     Work work;

@@ -23,7 +23,8 @@ class Askers {
   /// Returns UNAVAILABLE where the server was lost: the next work gets another client.
   using Work = std::function<absl::Status(const absl::StatusOr<client::Client*>&)>;
 
-  Askers(Connect connect, int threads);
+  /// niceness: of nice(1), for its threads.
+  Askers(Connect connect, int threads, int niceness);
   ~Askers();  ///< work that has not begun is not done
   Askers(const Askers&) = delete;
   Askers& operator=(const Askers&) = delete;
@@ -36,6 +37,7 @@ class Askers {
   void Run(const std::stop_token& stop);
 
   const Connect connect_;
+  const int niceness_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Work> waiting_;

@@ -1,8 +1,10 @@
 #include "server/page/question.h"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 
@@ -25,6 +27,13 @@ absl::StatusOr<std::optional<int>> NumberIn(const Target& target, const std::str
   if (given == target.query.end()) return std::optional<int>();
   ASSIGN_OR_RETURN(const int number, WholeNumber(given->second, name));
   return std::optional<int>(number);
+}
+
+/// As ids are: what is none need not be asked for.
+bool IsWord(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return absl::ascii_islower(c) || absl::ascii_isdigit(c);
+  });
 }
 
 absl::Status NoSuchAddress() { return absl::NotFoundError("there is nothing at this address"); }
@@ -64,6 +73,10 @@ absl::StatusOr<Question> ParseQuestion(const Target& target) {
   if (path.size() <= kNames || path[kNames] != "campaigns") return NoSuchAddress();
   if (path.size() == kNames + 1) return OfAllCampaigns(target);
   Question question{.document = Document::kShow, .campaign = path[kNames + 1]};
+  if (!IsWord(question.campaign)) {
+    return absl::NotFoundError(absl::StrCat("there is no campaign \"", question.campaign,
+                                            "\" (ids are like c1; see list)"));
+  }
   if (path.size() == kNames + 2) return question;
   const auto found = DocumentsOfCampaigns().find(path[kNames + 2]);
   if (found == DocumentsOfCampaigns().end()) return NoSuchAddress();

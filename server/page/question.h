@@ -25,7 +25,7 @@ enum class Document {
 
 struct Question {
   Document document = Document::kList;
-  std::string campaign{};       ///< as asked for, whatever that is; empty: of all campaigns
+  std::string campaign{};       ///< lower-case letters and digits; empty: of all campaigns
   std::optional<int> number{};  ///< sample of kStates and kGrains; iteration of kPosterior
   std::optional<int> limit{};   ///< of kList
   std::string after{};          ///< of kList

@@ -71,11 +71,10 @@ bool HttpConnection::ReceiveUntil(const std::string& text, std::chrono::millisec
 }
 
 bool HttpConnection::IsClosed(std::chrono::milliseconds limit) {
-  if (socket_ < 0) return true;
-  pollfd wait{.fd = socket_, .events = POLLIN, .revents = 0};
-  char byte = 0;
-  return poll(&wait, 1, static_cast<int>(limit.count())) > 0 &&
-         recv(socket_, &byte, 1, MSG_PEEK) <= 0;
+  const auto until = std::chrono::steady_clock::now() + limit;
+  while (Read(until)) {
+  }
+  return socket_ < 0 || std::chrono::steady_clock::now() < until;
 }
 
 HttpReply HttpConnection::Reply(bool is_head, std::chrono::milliseconds limit) {

@@ -31,7 +31,7 @@ class HttpConnection {
   const std::string& received() const { return received_; }
   /// A reply with a Content-Length, or to HEAD (is_head).
   HttpReply Reply(bool is_head = false, std::chrono::milliseconds limit = std::chrono::seconds(20));
-  /// Whether the other side has closed within `limit`.
+  /// Whether the other side closes within `limit`; what comes before that is received.
   bool IsClosed(std::chrono::milliseconds limit);
 
  private:

@@ -22,8 +22,9 @@ TEST(Admission, WantsTheTokenOrItsCookie) {
   const auto admission = Make(80);
   EXPECT_TRUE(With(*admission, "Bearer " + kToken, "").ok());
   EXPECT_TRUE(With(*admission, "bearer " + kToken, "").ok());
-  for (const std::string& wrong : {std::string(), kToken, "Bearer ", "Bearer x" + kToken,
-                                   "Bearer " + kToken.substr(1), "Basic " + kToken}) {
+  const std::vector<std::string> wrongs = {
+      "", kToken, "Bearer ", "Bearer x" + kToken, "Bearer " + kToken.substr(1), "Basic " + kToken};
+  for (const std::string& wrong : wrongs) {
     EXPECT_TRUE(absl::IsUnauthenticated(With(*admission, wrong, ""))) << wrong;
   }
   EXPECT_TRUE(absl::IsUnauthenticated(With(*admission, "", "calib-80=" + kToken)))

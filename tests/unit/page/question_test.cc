@@ -25,8 +25,10 @@ TEST(Question, IsTheDocumentOfItsAddress) {
 }
 
 TEST(Question, AtNoAddressIsNotFound) {
-  for (const char* target : {"", "campaign", "campaigns/c1/nothing", "campaigns/c1/states",
-                             "campaigns/c1/states/1/2", "campaigns/c1/compare/2", "workers/w1"}) {
+  for (const char* target :
+       {"", "campaign", "campaigns/c1/nothing", "campaigns/c1/states", "campaigns/c1/states/1/2",
+        "campaigns/c1/compare/2", "workers/w1", "campaigns/%ff", "campaigns/C1",
+        "campaigns//compare", "campaigns/c1%2F..", "campaigns/%3Cscript%3E"}) {
     EXPECT_TRUE(absl::IsNotFound(Parse(target).status())) << target;
   }
 }
