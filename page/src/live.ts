@@ -19,14 +19,16 @@ interface CampaignEvent {
 
 // What follows from the samples of whole iterations, and from what was concluded about them.
 const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
-// What grows with every run, as lists and the fit of what has no conclusion yet: no eye needs them faster.
-const kGrowing = 3000; // ms
+// How often what grows with every run is asked for again [ms]: no eye needs it faster, and each question costs the server.
+const kStatus = 2000;
+const kLists = 5000;
+const kUnconcluded = 15000; // of a campaign that has no conclusion yet: the server reads all its runs for it
 
 export class Live {
   private retryS = kFirstRetryS;
   private wasOpen = false;
   private readonly concluded = new Map<string, number>();
-  private readonly lastGrowth = new Map<string, number>();
+  private readonly lastAsked = new Map<string, number>(); // by campaign and interval
 
   constructor(
     private readonly answers: Answers,
@@ -57,7 +59,7 @@ export class Live {
       this.retryS = Math.min(2 * this.retryS, kLastRetryS);
     };
     source.addEventListener("campaign", (event) => this.onCampaign(parse(event) as CampaignEvent));
-    source.addEventListener("campaigns", () => this.mark((path) => path === "campaigns" || path.endsWith("/lineage")));
+    source.addEventListener("campaigns", () => this.mark((path) => path === "campaigns" || path.split("/").length === 2 || path.endsWith("/lineage")));
     source.addEventListener("workers", () => this.mark((path) => path === "workers"));
     for (const name of ["hello", "server"]) {
       source.addEventListener(name, (event) => {
@@ -87,16 +89,22 @@ export class Live {
     const concluded = event.concluded ?? 0;
     const isNew = this.concluded.get(id) !== concluded;
     this.concluded.set(id, concluded);
-    const now = performance.now();
-    const grows = now - (this.lastGrowth.get(id) ?? -Infinity) >= kGrowing;
-    if (grows) this.lastGrowth.set(id, now);
+    const due = (every: number): boolean => {
+      const key = `${id} ${every}`;
+      const now = performance.now();
+      if (now - (this.lastAsked.get(key) ?? -Infinity) < every) return false;
+      this.lastAsked.set(key, now);
+      return true;
+    };
+    const [status, lists, unconcluded] = [due(kStatus), due(kLists), due(kUnconcluded)];
     this.mark((path, answer) => {
-      if (path === "campaigns") return grows;
-      if (path === `campaigns/${id}`) return true;
+      if (path === "campaigns") return lists || isNew;
+      if (path === `campaigns/${id}`) return status || isNew;
       if (!path.startsWith(`campaigns/${id}/`)) return false;
       const [last = ""] = (path.split("/")[2] ?? "").split("?");
-      if (!kConclusions.includes(last)) return last === "samples" || last === "lineage" ? isNew || grows : false;
-      return isNew || (grows && !isConclusion(answer.state === "here" ? answer.value : null));
+      if (last === "samples") return lists || isNew;
+      if (!kConclusions.includes(last)) return false;
+      return isNew || (unconcluded && !isConclusion(answer.state === "here" ? answer.value : null));
     });
   }
 }
