@@ -1,7 +1,7 @@
 // The server's events: what has changed, never what it is now. The stream is opened again by our own clock, so that the page can
 // say when.
 
-import type { Answers } from "./answers.ts";
+import { kLeastInterval, type Answers } from "./answers.ts";
 
 export type Connection =
   | { state: "connecting" }
@@ -28,7 +28,6 @@ export class Live {
   private retryS = kFirstRetryS;
   private wasOpen = false;
   private readonly concluded = new Map<string, number>();
-  private readonly lastAsked = new Map<string, number>(); // by campaign and interval
 
   constructor(
     private readonly answers: Answers,
@@ -39,7 +38,7 @@ export class Live {
   start(): void {
     // Nobody looks: nothing is asked. Who comes back sees what is so now.
     document.addEventListener("visibilitychange", () => {
-      if (!document.hidden) this.answers.mark(() => true);
+      if (!document.hidden) this.answers.mark(() => kLeastInterval);
     });
     this.open();
   }
@@ -50,7 +49,7 @@ export class Live {
     source.onopen = () => {
       this.retryS = kFirstRetryS;
       this.tell({ state: "open" });
-      if (this.wasOpen) this.answers.mark(() => true); // whatever happened in between
+      if (this.wasOpen) this.answers.mark(() => kLeastInterval); // whatever happened in between
       this.wasOpen = true;
     };
     source.onerror = () => {
@@ -59,13 +58,13 @@ export class Live {
       this.retryS = Math.min(2 * this.retryS, kLastRetryS);
     };
     source.addEventListener("campaign", (event) => this.onCampaign(parse(event) as CampaignEvent));
-    source.addEventListener("campaigns", () => this.mark((path) => path === "campaigns" || path.split("/").length === 2 || path.endsWith("/lineage")));
-    source.addEventListener("workers", () => this.mark((path) => path === "workers"));
+    source.addEventListener("campaigns", () => this.mark((path) => (path === "campaigns" || path.split("/").length === 2 || path.endsWith("/lineage") ? kLeastInterval : null)));
+    source.addEventListener("workers", () => this.mark((path) => (path === "workers" ? kLeastInterval : null)));
     for (const name of ["hello", "server"]) {
       source.addEventListener(name, (event) => {
         const { up } = parse(event) as { up?: boolean };
         this.tell({ state: up === false ? "server_away" : "open" });
-        if (name === "server" && up === true) this.answers.mark(() => true);
+        if (name === "server" && up === true) this.answers.mark(() => kLeastInterval);
       });
     }
   }
@@ -89,22 +88,15 @@ export class Live {
     const concluded = event.concluded ?? 0;
     const isNew = this.concluded.get(id) !== concluded;
     this.concluded.set(id, concluded);
-    const due = (every: number): boolean => {
-      const key = `${id} ${every}`;
-      const now = performance.now();
-      if (now - (this.lastAsked.get(key) ?? -Infinity) < every) return false;
-      this.lastAsked.set(key, now);
-      return true;
-    };
-    const [status, lists, unconcluded] = [due(kStatus), due(kLists), due(kUnconcluded)];
+    const soon = (patience: number): number => (isNew ? kLeastInterval : patience);
     this.mark((path, answer) => {
-      if (path === "campaigns") return lists || isNew;
-      if (path === `campaigns/${id}`) return status || isNew;
-      if (!path.startsWith(`campaigns/${id}/`)) return false;
+      if (path === "campaigns") return soon(kLists);
+      if (path === `campaigns/${id}`) return soon(kStatus);
+      if (!path.startsWith(`campaigns/${id}/`)) return null;
       const [last = ""] = (path.split("/")[2] ?? "").split("?");
-      if (last === "samples") return lists || isNew;
-      if (!kConclusions.includes(last)) return false;
-      return isNew || (unconcluded && !isConclusion(answer.state === "here" ? answer.value : null));
+      if (last === "samples") return soon(kLists);
+      if (!kConclusions.includes(last)) return null;
+      return isNew || !isConclusion(answer.state === "here" ? answer.value : null) ? soon(kUnconcluded) : null;
     });
   }
 }
