@@ -96,7 +96,9 @@ export class Live {
       const [last = ""] = (path.split("/")[2] ?? "").split("?");
       if (last === "samples") return soon(kLists);
       if (!kConclusions.includes(last)) return null;
-      return isNew || !isConclusion(answer.state === "here" ? answer.value : null) ? soon(kUnconcluded) : null;
+      if (answer.state !== "here") return soon(kLists); // a refusal costs nothing
+      if (!isConclusion(answer.value)) return kUnconcluded;
+      return isNew ? kLeastInterval : null;
     });
   }
 }
