@@ -1,5 +1,5 @@
 // The documents that are shown, each held once: asked for when a view wants it, and again when an event has said that it
-// changed, at most once in kLeastInterval. Nothing is asked that nobody shows.
+// changed, at most once in kLeastInterval, and later where that is soon enough. Nothing is asked that nobody shows.
 
 /// What is known of a document. sentence: why it is not here, in the server's words.
 export type Answer<T> =
@@ -34,7 +34,8 @@ interface Held {
   stale: boolean;
   busy: boolean;
   askedAt: number;
-  planned: boolean;
+  patience: number; // ms between two questions that whoever marked it last is content with
+  due: number; // when it will be asked for again; infinite: no question is planned
 }
 
 export class Answers {
@@ -59,10 +60,13 @@ export class Answers {
     };
   }
 
-  /// These documents may have changed.
-  mark(which: (path: string, answer: Answer<unknown>) => boolean): void {
+  /// Documents may have changed: `which` says how many ms after the last question they may be asked for again at the earliest;
+  /// null: this one has not changed. What was marked more urgently stays so.
+  mark(which: (path: string, answer: Answer<unknown>) => number | null): void {
     for (const entry of this.held.values()) {
-      if (!which(entry.path, entry.answer)) continue;
+      const patience = which(entry.path, entry.answer);
+      if (patience === null) continue;
+      entry.patience = Math.max(kLeastInterval, entry.stale ? Math.min(entry.patience, patience) : patience);
       entry.stale = true;
       this.plan(entry);
     }
@@ -80,7 +84,8 @@ export class Answers {
         stale: true,
         busy: false,
         askedAt: -Infinity,
-        planned: false,
+        patience: kLeastInterval,
+        due: Infinity,
       };
       this.held.set(path, entry);
     }
@@ -88,16 +93,16 @@ export class Answers {
   }
 
   private plan(entry: Held): void {
-    if (!entry.stale || entry.busy || entry.planned || entry.listeners.size === 0) return;
-    const wait = entry.askedAt + kLeastInterval - this.now();
-    if (wait <= 0) {
+    if (!entry.stale || entry.busy || entry.listeners.size === 0) return;
+    const due = entry.askedAt + entry.patience;
+    if (due <= this.now()) {
       void this.fetch(entry);
-    } else {
-      entry.planned = true;
+    } else if (due < entry.due) {
+      entry.due = due;
       this.later(() => {
-        entry.planned = false;
-        if (entry.listeners.size > 0) void this.fetch(entry);
-      }, wait);
+        if (entry.due === due) entry.due = Infinity;
+        this.plan(entry);
+      }, due - this.now());
     }
   }
 

@@ -1,7 +1,7 @@
 // The server's events: what has changed, never what it is now. The stream is opened again by our own clock, so that the page can
 // say when.
 
-import type { Answers } from "./answers.ts";
+import { kLeastInterval, type Answers } from "./answers.ts";
 
 export type Connection =
   | { state: "connecting" }
@@ -19,14 +19,15 @@ interface CampaignEvent {
 
 // What follows from the samples of whole iterations, and from what was concluded about them.
 const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
-// What grows with every run, as lists and the fit of what has no conclusion yet: no eye needs them faster.
-const kGrowing = 3000; // ms
+// How often what grows with every run is asked for again [ms]: no eye needs it faster, and each question costs the server.
+const kStatus = 2000;
+const kLists = 5000;
+const kUnconcluded = 15000; // of a campaign that has no conclusion yet: the server reads all its runs for it
 
 export class Live {
   private retryS = kFirstRetryS;
   private wasOpen = false;
   private readonly concluded = new Map<string, number>();
-  private readonly lastGrowth = new Map<string, number>();
 
   constructor(
     private readonly answers: Answers,
@@ -37,7 +38,7 @@ export class Live {
   start(): void {
     // Nobody looks: nothing is asked. Who comes back sees what is so now.
     document.addEventListener("visibilitychange", () => {
-      if (!document.hidden) this.answers.mark(() => true);
+      if (!document.hidden) this.answers.mark(() => kLeastInterval);
     });
     this.open();
   }
@@ -48,7 +49,7 @@ export class Live {
     source.onopen = () => {
       this.retryS = kFirstRetryS;
       this.tell({ state: "open" });
-      if (this.wasOpen) this.answers.mark(() => true); // whatever happened in between
+      if (this.wasOpen) this.answers.mark(() => kLeastInterval); // whatever happened in between
       this.wasOpen = true;
     };
     source.onerror = () => {
@@ -57,13 +58,13 @@ export class Live {
       this.retryS = Math.min(2 * this.retryS, kLastRetryS);
     };
     source.addEventListener("campaign", (event) => this.onCampaign(parse(event) as CampaignEvent));
-    source.addEventListener("campaigns", () => this.mark((path) => path === "campaigns" || path.endsWith("/lineage")));
-    source.addEventListener("workers", () => this.mark((path) => path === "workers"));
+    source.addEventListener("campaigns", () => this.mark((path) => (path === "campaigns" || path.split("/").length === 2 || path.endsWith("/lineage") ? kLeastInterval : null)));
+    source.addEventListener("workers", () => this.mark((path) => (path === "workers" ? kLeastInterval : null)));
     for (const name of ["hello", "server"]) {
       source.addEventListener(name, (event) => {
         const { up } = parse(event) as { up?: boolean };
         this.tell({ state: up === false ? "server_away" : "open" });
-        if (name === "server" && up === true) this.answers.mark(() => true);
+        if (name === "server" && up === true) this.answers.mark(() => kLeastInterval);
       });
     }
   }
@@ -87,16 +88,17 @@ export class Live {
     const concluded = event.concluded ?? 0;
     const isNew = this.concluded.get(id) !== concluded;
     this.concluded.set(id, concluded);
-    const now = performance.now();
-    const grows = now - (this.lastGrowth.get(id) ?? -Infinity) >= kGrowing;
-    if (grows) this.lastGrowth.set(id, now);
+    const soon = (patience: number): number => (isNew ? kLeastInterval : patience);
     this.mark((path, answer) => {
-      if (path === "campaigns") return grows;
-      if (path === `campaigns/${id}`) return true;
-      if (!path.startsWith(`campaigns/${id}/`)) return false;
+      if (path === "campaigns") return soon(kLists);
+      if (path === `campaigns/${id}`) return soon(kStatus);
+      if (!path.startsWith(`campaigns/${id}/`)) return null;
       const [last = ""] = (path.split("/")[2] ?? "").split("?");
-      if (!kConclusions.includes(last)) return last === "samples" || last === "lineage" ? isNew || grows : false;
-      return isNew || (grows && !isConclusion(answer.state === "here" ? answer.value : null));
+      if (last === "samples") return soon(kLists);
+      if (!kConclusions.includes(last)) return null;
+      if (answer.state !== "here") return soon(kLists); // a refusal costs nothing
+      if (!isConclusion(answer.value)) return kUnconcluded;
+      return isNew ? kLeastInterval : null;
     });
   }
 }

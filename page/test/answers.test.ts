@@ -23,7 +23,7 @@ test("marks are gathered: at most one question in the least interval", async () 
   const answers = new Answers(async () => json({ n: ++asked }), () => now, (task, ms) => timers.push({ task, ms }));
   answers.watch("a", () => {});
   await settled();
-  for (let i = 0; i < 100; ++i) answers.mark((path) => path === "a");
+  for (let i = 0; i < 100; ++i) answers.mark((path) => (path === "a" ? kLeastInterval : null));
   await settled();
   assert.equal(asked, 1);
   assert.deepEqual(timers.map(({ ms }) => ms), [kLeastInterval]);
@@ -41,7 +41,7 @@ test("what nobody watches is not asked for again", async () => {
   await settled();
   stop();
   now += 2 * kLeastInterval;
-  answers.mark(() => true);
+  answers.mark(() => kLeastInterval);
   await settled();
   assert.equal(asked, 1);
   answers.watch("a", () => {});
@@ -60,7 +60,7 @@ test("an unchanged document is not drawn anew, and 304 is asked for by its tag",
   answers.watch("a", () => ++told);
   await settled();
   now += kLeastInterval;
-  answers.mark(() => true);
+  answers.mark(() => kLeastInterval);
   await settled();
   assert.deepEqual(tags, [null, '"1"']);
   assert.equal(told, 2, "asked, here");
@@ -78,12 +78,12 @@ test("what was here stays while the server is away; a refusal replaces it", asyn
   await settled();
   mode = "away";
   now += kLeastInterval;
-  answers.mark(() => true);
+  answers.mark(() => kLeastInterval);
   await settled();
   assert.deepEqual(last, { state: "here", value: [1] });
   mode = "refused";
   now += kLeastInterval;
-  answers.mark(() => true);
+  answers.mark(() => kLeastInterval);
   await settled();
   assert.deepEqual(last, { state: "failed", status: 401, sentence: "no token" });
 });
@@ -101,4 +101,30 @@ test("no document is told from a broken answer, in the server's words", async ()
   assert.deepEqual(last.get("none"), { state: "none", sentence: "c9 has no diagnosis." });
   assert.equal(last.get("broken")?.state, "failed");
   assert.deepEqual(last.get("strange"), { state: "failed", status: 502, sentence: "The server answered with status 502." });
+});
+
+test("what may wait is asked for in the end, and sooner when it becomes urgent", async () => {
+  const timers: { task: () => void; ms: number }[] = [];
+  let now = 0;
+  let asked = 0;
+  const answers = new Answers(async () => json({ n: ++asked }), () => now, (task, ms) => timers.push({ task, ms }));
+  answers.watch("a", () => {});
+  await settled();
+  answers.mark(() => 15 * kLeastInterval);
+  answers.mark(() => kLeastInterval);
+  assert.deepEqual(timers.map(({ ms }) => ms), [15 * kLeastInterval, kLeastInterval]);
+  now += kLeastInterval;
+  timers[1]!.task();
+  await settled();
+  assert.equal(asked, 2);
+  now += 14 * kLeastInterval;
+  timers[0]!.task();
+  await settled();
+  assert.equal(asked, 2, "the patient question has been answered");
+  answers.mark(() => 15 * kLeastInterval);
+  assert.equal(timers.length, 3);
+  now += 15 * kLeastInterval;
+  timers[2]!.task();
+  await settled();
+  assert.equal(asked, 3);
 });
