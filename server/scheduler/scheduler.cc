@@ -652,11 +652,12 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
       },
       [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
        changes_state = plan.event.has_value(),
+       concludes = plan.conclusion.has_value() || plan.start.has_value() || plan.draws.has_value(),
        stop_below = plan.stop_below](const absl::Status& status) {
         computing_.erase(campaign);
         if (changes_state) {
           StateChanged(campaign);
-        } else {
+        } else if (concludes) {
           Concluded(campaign);
         }
         CampaignRun* planned = FindRun(campaign);

@@ -59,7 +59,7 @@ TEST(SurrogateCampaign, FindsABetterFitThanTheDesign) {
 // What a run that is stopped could still have come to is worse than the best of the round before:
 // it takes no part in the surrogate, and which are stopped does not depend on who answers first.
 TEST(SurrogateCampaign, EndsHopelessRunsEarlyAndFindsAsGoodAFit) {
-  struct Ended {
+  struct SearchEnd {
     double best = -std::numeric_limits<double>::infinity();  // ln likelihood
     int stopped = 0;
     std::vector<double> log_likelihoods{};
@@ -68,7 +68,7 @@ TEST(SurrogateCampaign, EndsHopelessRunsEarlyAndFindsAsGoodAFit) {
     SimulatedService service(name);
     service.Submit(Campaign(10, 5, 0.02, "", "  termination: " + termination + "\n"));
     service.RunToEnd(order, order == 1);
-    Ended ended;
+    SearchEnd ended;
     ended.stopped =
         Posterior(service, Value(service.Read().Iterations(1)).size() - 1).stopped_early();
     for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
@@ -77,9 +77,9 @@ TEST(SurrogateCampaign, EndsHopelessRunsEarlyAndFindsAsGoodAFit) {
     }
     return ended;
   };
-  const Ended all = run("surrogate_all", "off", 1);
-  const Ended some = run("surrogate_some", "4", 1);
-  const Ended again = run("surrogate_again", "4", 2);
+  const SearchEnd all = run("surrogate_all", "off", 1);
+  const SearchEnd some = run("surrogate_some", "4", 1);
+  const SearchEnd again = run("surrogate_again", "4", 2);
   EXPECT_EQ(all.stopped, 0);
   EXPECT_GE(some.stopped, 1);
   EXPECT_LT(some.stopped, 40) << "of the forty after the design";
