@@ -130,6 +130,8 @@ class Nightly(unittest.TestCase):
             for line in killed.stdout:  # until the second piece has begun
                 if line.startswith('second:'):
                     break
+            while 'second' not in self.read('ran'):  # and its command too, which outlives a SIGKILL
+                time.sleep(0.01)
             killed.send_signal(kill)
             killed.stdout.close()
             self.assertNotEqual(killed.wait(10), 0)

@@ -44,8 +44,8 @@ bool HttpConnection::Send(const std::string& bytes) const {
 }
 
 bool HttpConnection::Read(std::chrono::steady_clock::time_point until) {
-  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-      until - std::chrono::steady_clock::now());
+  const auto left =  // rounded up, so that a wait ends after its time
+      std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
   pollfd wait{.fd = socket_, .events = POLLIN, .revents = 0};
   if (left.count() <= 0 || poll(&wait, 1, static_cast<int>(left.count())) <= 0) return false;
   std::array<char, 65536> bytes{};

@@ -16,7 +16,7 @@ export function candidateTable(diagnosis: Diagnosis): HTMLElement | null {
   const others = diagnosis.candidates.filter((candidate) => !likely.includes(candidate));
   if (likely.length === 0) return null;
   return h("div", {}, rowsOf(diagnosis, likely, "Effects"),
-    others.length === 0 ? null : h("details", {}, h("summary", {}, `${others.length} effects with less than 1 %`), rowsOf(diagnosis, others, "Effects that hardly act")));
+    others.length === 0 ? null : h("details", {}, h("summary", {}, others.length === 1 ? "one effect with less than 1 %" : `${others.length} effects with less than 1 %`), rowsOf(diagnosis, others, "Effects that hardly act")));
 }
 
 function rowsOf(diagnosis: Diagnosis, candidates: readonly Candidate[], name: string): HTMLElement {
