@@ -1,5 +1,5 @@
 // Errors over many seeds are as large as stated, no larger and no smaller, where the answer is
-// known. $CALIB_SEEDS sets their number (50; 10 in ctest).
+// known. $CALIB_SEEDS sets their number (50; 5 in ctest).
 
 #include <gtest/gtest.h>
 
