@@ -1,4 +1,4 @@
-# cmake -DSOURCE=<page/> -DWORK=<folder> -DNPM=<npm> -P build_page.cmake: makes WORK/dist, the files of the live page. Packages
+# cmake -DSOURCE=<web/> -DWORK=<folder> -DNPM=<npm> -P build_page.cmake: makes WORK/dist, the files of the live page. Packages
 # are fetched only where the lock file is another than at the last time.
 file(MAKE_DIRECTORY ${WORK})
 foreach(name src package.json build.mjs tsconfig.json .npmrc)
