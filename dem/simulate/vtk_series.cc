@@ -111,6 +111,8 @@ VtkPiece ContactsOf(const Assembly& assembly) {
   std::vector<Vec3> forces;
   std::vector<double> normal;
   std::vector<double> tangential;
+  std::vector<std::int32_t> first;
+  std::vector<std::int32_t> second;
   for (int s = 0; s < list.size(); ++s) {
     if (!assembly.touching(s)) {
       continue;
@@ -122,13 +124,16 @@ VtkPiece ContactsOf(const Assembly& assembly) {
     const Vec3 force = assembly.force_on_j(s);
     const Vec3 n = (1.0 / Length(branch)) * branch;
     forces.push_back(force);
+    first.push_back(assembly.particles().id[Index(list.first[Index(s)])]);
+    second.push_back(assembly.particles().id[Index(list.second[Index(s)])]);
     normal.push_back(Dot(force, n));
     tangential.push_back(Length(force - normal.back() * n));
   }
   piece.connectivity = Counted(piece.points.size(), 0, 1);
   piece.offsets = Counted(normal.size(), 2, 2);
   piece.cell_data = VtkArray("force", forces) + VtkArray("normal_force", normal) +
-                    VtkArray("tangential_force", tangential);
+                    VtkArray("tangential_force", tangential) + VtkArray("first_grain", first) +
+                    VtkArray("second_grain", second);
   return piece;
 }
 

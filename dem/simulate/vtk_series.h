@@ -18,7 +18,8 @@ namespace calib::dem {
 ///                                    cell_length [m], cell_tilt [m]
 ///   contacts.pvd  contacts_NNNN.vtp  a line per contact of grains from centre to centre:
 ///                                    force on the grain at its end, as a vector; normal_force
-///                                    (compression positive), tangential_force [N]
+///                                    (compression positive), tangential_force [N];
+///                                    first_grain, second_grain: ids of those it joins
 ///   cell.pvd      cell_NNNN.vtp      the edges of the periodic cell; field data load_step, stress:
 ///                                    Love-Weber along x, y, z, compression positive [Pa]; only
 ///                                    where the cell is closed on all sides

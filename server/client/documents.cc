@@ -160,6 +160,13 @@ absl::StatusOr<std::string> FindingDocument(Client& client, const std::string& c
                    kind == kDiagnosis ? "diagnose " : "improve ", campaign, "` makes one"));
 }
 
+absl::StatusOr<std::vector<report::StoredDiagnosis>> DiagnosesOf(Client& client,
+                                                                 const std::string& campaign) {
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(campaign));
+  ASSIGN_OR_RETURN(Kept kept, KeptOf(client, findings, kDiagnosis));
+  return std::move(kept.diagnoses);
+}
+
 namespace {
 
 // What is known before an iteration is complete: of states those of the runs that are drawn.

@@ -12,6 +12,7 @@
 #include "server/report/views/comparison.h"
 #include "server/report/views/curves.h"
 #include "server/report/views/lineage.h"
+#include "server/report/views/stored_diagnosis.h"
 
 namespace calib::client {
 
@@ -43,6 +44,10 @@ absl::StatusOr<std::string> WorkersDocument(Client& client);
 /// there is none.
 absl::StatusOr<std::string> FindingDocument(Client& client, const std::string& campaign,
                                             const std::string& kind);
+
+/// The diagnoses that were kept with the campaign and can be read, in the order in which they were.
+absl::StatusOr<std::vector<report::StoredDiagnosis>> DiagnosesOf(Client& client,
+                                                                 const std::string& campaign);
 
 /// A campaign against its measurements, with all that `compare` tells.
 struct Compared {

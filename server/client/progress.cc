@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <utility>
 
 #include "server/messages/read_words.h"
 #include "server/report/text/people_units.h"
@@ -66,6 +67,33 @@ void ProgressLine::Show(const std::string& text, int milestone) {
   std::cerr << text << "\n";
   last_milestone_ = milestone;
   last_ = now;
+}
+
+BusyLine::BusyLine(std::string what) {
+  if (isatty(STDERR_FILENO) != 0) drawer_ = std::thread(&BusyLine::Draw, this, std::move(what));
+}
+
+BusyLine::~BusyLine() {
+  if (!drawer_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+  ended_.notify_all();
+  drawer_.join();
+}
+
+void BusyLine::Draw(std::string what) {
+  constexpr int kSilent = 2;  // s
+  std::unique_lock lock(mutex_);
+  bool drawn = false;
+  for (int seconds = 1; !ended_.wait_for(lock, std::chrono::seconds(1), [this] { return over_; });
+       ++seconds) {
+    if (seconds <= kSilent) continue;
+    std::cerr << "\r\x1b[K" << what << "  " << report::Duration(seconds) << std::flush;
+    drawn = true;
+  }
+  if (drawn) std::cerr << "\r\x1b[K" << std::flush;
 }
 
 }  // namespace calib::client

@@ -3,7 +3,10 @@
 // otherwise.
 
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <string>
+#include <thread>
 
 #include "calib/v1/campaign.pb.h"
 
@@ -33,6 +36,25 @@ class ProgressLine {
   bool drawn_ = false;
   int last_milestone_ = -1;
   std::chrono::steady_clock::time_point last_{};
+};
+
+/// While it lives a terminal is told what is being computed and for how long, from the third second
+/// on; then the line is erased. Off a terminal nothing is said. Nothing else may be written to
+/// standard error meanwhile. Not thread-safe.
+class BusyLine {
+ public:
+  explicit BusyLine(std::string what);
+  ~BusyLine();
+  BusyLine(const BusyLine&) = delete;
+  BusyLine& operator=(const BusyLine&) = delete;
+
+ private:
+  void Draw(std::string what);
+
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  bool over_ = false;
+  std::thread drawer_;
 };
 
 }  // namespace calib::client

@@ -57,14 +57,19 @@ std::string Meaning(const inspection::ColumnMeaning& column) {
                                                : absl::StrCat("(", column.role, ")");
 }
 
+// "1 row", "12 rows".
+std::string Counted(std::size_t count, const char* what) {
+  return absl::StrCat(count, " ", what, count == 1 ? "" : "s");
+}
+
 }  // namespace
 
 std::string InspectionText(const Inspection& inspection, const report::TerminalStyle& style) {
   const inspection::InspectedTable& table = inspection.table;
-  std::string text = absl::StrCat(inspection.file, ": ", inspection.rows, " rows, cells parted by ",
+  std::string text = absl::StrCat(inspection.file, ": ", Counted(inspection.rows, "row"), ", cells parted by ",
                                   inspection::DelimiterWord(table.parting), ", decimal ",
                                   inspection::DecimalWord(table.mark), ", ", table.encoding, ", ",
-                                  table.header_lines, " lines above the rows\n");
+                                  Counted(table.header_lines, "line"), " above the rows\n");
   if (inspection.tests.size() > 1) {
     std::vector<std::string> names;
     constexpr std::size_t kShown = 8;
@@ -103,7 +108,7 @@ std::string InspectionText(const Inspection& inspection, const report::TerminalS
     }
   }
   absl::StrAppend(&text, "\nAbout ", std::round(inspection.independent_readings), " of ",
-                  inspection.rows, " rows say something of their own.\n");
+                  Counted(inspection.rows, "row"), " say something of their own.\n");
   const std::string plot = Plot(inspection, style);
   return plot.empty() ? text : absl::StrCat(text, "\n", plot);
 }

@@ -13,6 +13,7 @@
 #include "inference/diagnosis/diagnosis_set.h"
 #include "inference/diagnosis/visible_strength.h"
 #include "inference/numerics/special_functions.h"
+#include "server/client/progress.h"
 #include "server/diagnosis/design_caps.h"
 
 namespace calib::diagnosis {
@@ -98,6 +99,8 @@ std::vector<inference::EffectModel> LeadingTriples(
   return triples;
 }
 
+constexpr const char* kWeighing = "weighing the models";
+
 absl::Status SetProbabilities(Asked& asked) {
   asked.probabilities.clear();
   for (const auto& evidence : asked.evidence) {
@@ -110,6 +113,7 @@ absl::Status SetProbabilities(Asked& asked) {
 absl::StatusOr<std::shared_ptr<const inference::DiagnosisSet>> FitSet(
     const KnownBefore& before, const DesignRows& rows, const std::vector<EndedBatch>& batches,
     const PartOfRace& part) {
+  const client::BusyLine busy("fitting the emulator of the runs");
   ASSIGN_OR_RETURN(inference::DiagnosisSet set,
                    inference::DiagnosisSet::Fit(SetRunsOf(before.base, rows, batches, part)));
   return std::make_shared<const inference::DiagnosisSet>(std::move(set));
@@ -387,6 +391,7 @@ absl::StatusOr<Asked> AskEvidences(const KnownBefore& before, const Knowledge& k
                                    Effort effort) {
   const EvidenceQuestion question = QuestionOf(before, knowledge, effort, nullptr);
   Asked asked{.space = question.space};
+  const client::BusyLine busy(kWeighing);
   ASSIGN_OR_RETURN(asked.evidence, question.Of(asked.space));
   return asked;
 }
@@ -395,6 +400,7 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
                           const FurtherMeasured* further) {
   EvidenceQuestion question = QuestionOf(before, knowledge, effort, further);
   Asked asked{.space = question.space};
+  const client::BusyLine busy(kWeighing);
   ASSIGN_OR_RETURN(asked.evidence, question.Of(asked.space));
   RETURN_IF_ERROR(SetProbabilities(asked));
   if (effort == Effort::kToChoose || further != nullptr) return asked;

@@ -320,8 +320,10 @@ absl::StatusOr<std::string> CampaignDraft(const std::vector<InspectedFile>& file
   if (!dem::InPeriodicCell(*info)) {
     return absl::InvalidArgumentError(
         absl::StrCat("--test: ", info->name,
-                     " has settings that no table says (`calibctl tests`); a campaign is written "
-                     "for tests of a specimen: triaxial, oedometric, isotropic, simple shear"));
+                     " has settings that no table says, and a campaign is written for tests of a "
+                     "specimen alone: triaxial, oedometric, isotropic, simple shear; `calibctl new "
+                     "--test ",
+                     info->name, " --contact hertz_mindlin` writes one in which they stand"));
   }
   std::string experiments;
   std::set<std::string> taken;

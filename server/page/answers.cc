@@ -6,6 +6,7 @@
 #include "proto/rpc/digest.h"
 #include "server/client/documents.h"
 #include "server/client/findings.h"
+#include "server/client/kept_grains.h"
 #include "server/page/compact.h"
 
 namespace calib::page {
@@ -14,14 +15,6 @@ namespace {
 /// Shorter ones fit into a packet of the network as they are.
 constexpr std::size_t kWorthCompressing = 1400;
 constexpr std::size_t kTagDigits = 32;
-
-/// FAILED_PRECONDITION: the server keeps states, and no packings.
-absl::StatusOr<std::string> Grains(client::Client& client, const Question& question) {
-  const auto states = client.GetStates(question.campaign, question.number);
-  if (!states.ok()) return states.status();
-  return absl::FailedPreconditionError(absl::StrCat("no packing of sample ", *question.number,
-                                                    " of ", question.campaign, " was kept"));
-}
 
 absl::StatusOr<std::string> Find(client::Client& client, client::CampaignShelf& shelf,
                                  const Question& question) {
@@ -46,7 +39,11 @@ absl::StatusOr<std::string> Find(client::Client& client, client::CampaignShelf& 
     case Document::kStates:
       return client::StatesDocument(client, campaign, *question.number);
     case Document::kGrains:
-      return Grains(client, question);
+      return client::GrainsDocument(client,
+                                    {.campaign = campaign,
+                                     .sample = *question.number,
+                                     .experiment = question.experiment},
+                                    question.load_step);
     case Document::kWorkers:
       return client::WorkersDocument(client);
   }

@@ -133,12 +133,12 @@ std::string Changes::StampOf(const Question& question) const {
       return absl::StrCat(epoch_, "/", list_, "/", known.version, "/", waits_);
     case Document::kSamples:
     case Document::kStates:
-    case Document::kGrains:
       return absl::StrCat(epoch_, "/", known.version);
     case Document::kPosterior:
     case Document::kCompare:
     case Document::kDiagnosis:
     case Document::kImprovement:
+    case Document::kGrains:
       return absl::StrCat(epoch_, "/", known.concluded);
   }
   return "";

@@ -200,10 +200,10 @@ void Page::Impl::Ask(const HttpRequest& request, const Target& target,
                  if (kept.ok()) {
                    finish(Send(request, *kept, kJson, "no-store"));
                  } else if (question.document == Document::kGrains &&
-                            absl::IsFailedPrecondition(kept.status())) {
+                            absl::IsNotFound(kept.status())) {
                    finish(Refusal(404, std::string(kept.status().message()),
                                   absl::StrCat("calibctl vtk ", question.campaign, " ",
-                                               *question.number, " -o grains")));
+                                               *question.number, " --keep -o grains")));
                  } else {
                    finish(Refusal(kept.status()));
                  }

@@ -61,7 +61,8 @@ absl::StatusOr<Question> OfAllCampaigns(const Target& target) {
 
 std::string Question::Key() const {
   return absl::StrCat(static_cast<int>(document), "/", number.value_or(-1), "/", limit.value_or(-1),
-                      "/", campaign.size(), "/", campaign, "/", after);
+                      "/", load_step.value_or(-1), "/", campaign.size(), "/", campaign, "/",
+                      experiment.size(), "/", experiment, "/", after);
 }
 
 absl::StatusOr<Question> ParseQuestion(const Target& target) {
@@ -86,6 +87,11 @@ absl::StatusOr<Question> ParseQuestion(const Target& target) {
   if (path.size() != kNames + (of_sample ? 4 : 3)) return NoSuchAddress();
   if (of_sample) {
     ASSIGN_OR_RETURN(question.number, WholeNumber(path.back(), "sample"));
+  }
+  if (question.document == Document::kGrains) {
+    const auto named = target.query.find("experiment");
+    if (named != target.query.end()) question.experiment = named->second;
+    ASSIGN_OR_RETURN(question.load_step, NumberIn(target, "load_step"));
   }
   if (question.document == Document::kPosterior) {
     ASSIGN_OR_RETURN(question.number, NumberIn(target, "iteration"));

@@ -29,6 +29,8 @@ struct Question {
   std::optional<int> number{};  ///< sample of kStates and kGrains; iteration of kPosterior
   std::optional<int> limit{};   ///< of kList
   std::string after{};          ///< of kList
+  std::string experiment{};     ///< of kGrains; empty: any
+  std::optional<int> load_step{};  ///< of kGrains; none: the last
 
   /// The same for equal questions and for no others.
   std::string Key() const;

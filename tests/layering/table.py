@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < { scheduler report/plot } < { service report/html } < report/documents < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
+           < scheduler < { service report/documents } < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
@@ -32,7 +32,7 @@ server/scheduler  | dem inference proto/calib server/campaign server/messages se
 server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
 server            | proto/rpc server/store server/scheduler server/service server/client server/page | spdlog CLI chrono
 server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
-server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp chrono
+server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp nlohmann chrono
 server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono
 server/page       | proto/calib proto/rpc server/access server/messages server/report server/client | openssl nlohmann chrono
 server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann

@@ -1,5 +1,4 @@
-// Two campaigns that are made in seconds. `large`: a table of runs, a closed form in the place of the DEM. `fast`: spheres that
-// hit a wall, a hundred states a run.
+// A campaign that is made in seconds: a table of runs, a closed form in the place of the DEM.
 
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -50,30 +49,6 @@ experiments:
       q_over_p: {noise: {absolute: 0.03}}
       volumetric_strain: {noise: {absolute: 0.0005}}
 inference: {method: sqmc, samples: ${samples}}
-seed: 1
-`);
-}
-
-/// Writes fast.yaml and its measurement into the folder.
-export function writeFast(folder, samples) {
-  const angles = Array.from({ length: kStates }, (_, i) => 0.02 + (1.3 * i) / kStates);
-  writeFileSync(join(folder, "wall.csv"), ["impact_angle,normal_restitution,tangential_restitution", ...angles.map((angle) => `${angle},0.85,${1 - 0.4 * Math.sin(2 * angle)}`)].join("\n") + "\n");
-  writeFileSync(join(folder, "fast.yaml"), `name: impacts
-model: {contact: hertz_mindlin, effects: [], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 0.02 GPa, max: 1 GPa}
-  friction_coefficient: {prior: uniform, min: 0.05, max: 1}
-experiments:
-  - name: wall
-    test: collision
-    radius: 5 mm
-    impact_speed: 1 m/s
-    data: {file: wall.csv}
-    control: impact_angle
-    observables:
-      normal_restitution: {noise: {absolute: 0.03}}
-      tangential_restitution: {noise: {absolute: 0.03}}
-inference: {method: iterative_bayesian_filter, max_iterations: 1, samples: ${samples}}
 seed: 1
 `);
 }

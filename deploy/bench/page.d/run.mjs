@@ -1,5 +1,5 @@
-// run.mjs CHROMIUM BIN MODULES: what the live page costs whoever looks and the server; prints Markdown. The worker of
-// the second campaign computes 8 ms of every 100, so that about 100 states/s arrive.
+// run.mjs CHROMIUM BIN MODULES: what the live page costs whoever looks and the server; prints Markdown. States come from
+// workers without mechanics (tests/load), so that 100 a second arrive whatever the machine does.
 
 import { execFile, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -9,13 +9,15 @@ import { join } from "node:path";
 import { argv } from "node:process";
 import { promisify } from "node:util";
 import { launch, tools, until } from "../../../tests/page/looks.mjs";
-import { writeFast, writeLarge } from "./campaigns.mjs";
+import { writeLarge } from "./campaigns.mjs";
 
 const [chromium, bin, modules] = argv.slice(2);
 const kSamples = 2000; // of 100 states each
 const kViews = 10;
 const kWatchS = 30;
 const kStatesPerSecond = 100;
+const kStreams = 10;
+const kRounds = 3;
 const kLongTaskMs = 50; // from where a browser reports a task
 
 const folder = mkdtempSync(join(tmpdir(), "calib-page-bench-"));
@@ -46,20 +48,25 @@ function processorSeconds(pid) {
   return (Number(fields[11]) + Number(fields[12])) / 100;
 }
 
-/// Lets a worker compute a share of the time, so that states arrive at about the rate that is asked for.
-function slowed(worker, share) {
-  const kPeriodMs = 100;
-  let ended = false;
-  void (async () => {
-    while (!ended) {
-      worker.kill("SIGCONT");
-      await pause(kPeriodMs * share);
-      worker.kill("SIGSTOP");
-      await pause(kPeriodMs * (1 - share));
-    }
-    worker.kill("SIGCONT");
-  })();
-  return () => (ended = true);
+/// States at a given rate from a worker without mechanics (tests/load); resolves to what it has seen.
+const load = (asked, token, words) =>
+  promisify(execFile)(join(bin, "load"), ["--server", asked, "--token", token, "--workers", "2", "--slots", "8", ...words], { cwd: folder })
+    .then(({ stdout }) => JSON.parse(stdout));
+
+/// Opens event streams and reads them until the returned function is called.
+async function eventStreams(http, token, count) {
+  const controller = new AbortController();
+  let bytes = 0;
+  for (let i = 0; i < count; ++i) {
+    const reply = await fetch(`http://127.0.0.1:${http}/api/v1/events`, { headers: { Authorization: `Bearer ${token}` }, signal: controller.signal });
+    void (async () => {
+      for await (const chunk of reply.body) bytes += chunk.length;
+    })().catch(() => {});
+  }
+  return () => {
+    controller.abort();
+    return bytes;
+  };
 }
 
 async function firstView(browser, address, fragment) {
@@ -98,7 +105,6 @@ async function watched(browser, address, fragment) {
 
 async function main() {
   writeLarge(folder, kSamples);
-  writeFast(folder, 4000);
   const [port, http] = [await freePort(), await freePort()];
   const state = join(folder, "state");
   const server = start("calibd", ["--state", state, "--listen", `127.0.0.1:${port}`, "--http", `127.0.0.1:${http}`]);
@@ -118,27 +124,37 @@ async function main() {
     console.log(`| ${name} | ${median(times)} | ${times.join(" ")} |`);
   }
 
-  await calibctl(...asked, "submit", "fast.yaml");
-  const worker = start("calib-worker", ["--server", `127.0.0.1:${port}`, "--slots", "1"]);
-  await pause(2000);
-  const stopSlowing = slowed(worker, 0.08);
+  // Acknowledgements, alternately without and with event streams.
+  const tokenFile = join(state, "token");
+  console.log(`\n| ${kStatesPerSecond} states/s | p50 of acknowledgements [ms] | p99 [ms] |\n|---|---|---|`);
+  for (let round = 0; round < kRounds; ++round) {
+    for (const streams of [0, kStreams]) {
+      const end = await eventStreams(http, token, streams);
+      const seen = await load(asked[1], tokenFile, ["--rate", `${kStatesPerSecond}`, "--warm-up", "3", "--seconds", "15", "--samples", `${2000 + 2 * round + (streams > 0)}`]);
+      end();
+      console.log(`| ${streams} event streams | ${seen.p50_ms.toFixed(1)} | ${seen.p99_ms.toFixed(1)} |`);
+    }
+  }
+
+  const source = load(asked[1], tokenFile, ["--rate", `${kStatesPerSecond}`, "--warm-up", "0", "--seconds", `${4 * (kWatchS + 8)}`, "--samples", "1500"]);
   await pause(5000);
+  const watchedId = JSON.parse(await calibctl(...asked, "--json", "list")).at(-1).campaign;
   const spent = async (what) => {
-    const rate = JSON.parse(await calibctl(...asked, "--json", "show", "c2")).states_per_second;
     const before = processorSeconds(server.pid);
     const tasks = await what();
+    const { states_per_second: rate } = JSON.parse(await calibctl(...asked, "--json", "show", watchedId));
     return { rate, seconds: processorSeconds(server.pid) - before, tasks };
   };
   const rows = [];
   rows.push(["nobody looks", await spent(async () => (await pause(1000 * (kWatchS + 3)), []))]);
-  rows.push(["how far", await spent(() => watched(browser, address, "#/c2/progress"))]);
-  rows.push(["does it fit", await spent(() => watched(browser, address, "#/c2/fit"))]);
+  rows.push(["how far", await spent(() => watched(browser, address, `#/${watchedId}/progress`))]);
+  rows.push(["does it fit", await spent(() => watched(browser, address, `#/${watchedId}/fit`))]);
   rows.push(["campaigns", await spent(() => watched(browser, address, "#/"))]);
   console.log(`\n| ${kWatchS} s at about ${kStatesPerSecond} states/s, looked at | states/s | script tasks over ${kLongTaskMs} ms | longest [ms] | calibd [s of a core] |\n|---|---|---|---|---|`);
   for (const [name, { rate, seconds, tasks }] of rows) {
     console.log(`| ${name} | ${rate?.toFixed(0) ?? "–"} | ${tasks.length} | ${tasks.length === 0 ? "–" : Math.round(Math.max(...tasks))} | ${seconds.toFixed(2)} |`);
   }
-  stopSlowing();
+  await source;
   await browser.close();
 }
 

@@ -4,15 +4,21 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/client/documents.h"
+#include "server/client/progress.h"
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/next_step.h"
 #include "server/ctl/option_list.h"
+#include "server/ctl/terminal.h"
 #include "server/ctl/verb.h"
+#include "server/report/documents/fit_plots.h"
+#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
+
+constexpr int kPlots = 6;  // more scroll out of sight
 
 struct CompareOptions {
   std::string campaign;
@@ -35,16 +41,19 @@ void Declare(OptionList& list, CompareOptions& options) { list.Campaign(options.
 
 absl::StatusOr<int> Compare(const CommonOptions& common, const CompareOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  const auto ask = [&] {
+    const client::BusyLine busy("comparing " + options.campaign + " with its measurements");
+    return client::CompareInFull(session->client(), options.campaign);
+  };
+  ASSIGN_OR_RETURN(const auto compared, ask());
   if (common.json) {
-    ASSIGN_OR_RETURN(const auto document,
-                     client::CompareDocument(session->client(), options.campaign));
-    std::cout << document;
+    std::cout << report::ComparisonJson(options.campaign, compared.comparison, compared.curves);
     return kDone;
   }
-  ASSIGN_OR_RETURN(const auto compared, client::CompareInFull(session->client(), options.campaign));
   const report::Comparison& comparison = compared.comparison;
   if (!compared.is_known) return absl::FailedPreconditionError(comparison.note);
-  std::cout << ComparisonText(comparison) + Next(common, options, comparison);
+  std::cout << ComparisonText(comparison) + report::FitPlots(compared.curves, kPlots, ThisTerminal()) +
+                   Next(common, options, comparison);
   return kDone;
 }
 

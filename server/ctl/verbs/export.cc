@@ -11,12 +11,13 @@
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
+#include "server/ctl/report_file.h"
 #include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
 #include "server/messages/read_words.h"
 #include "server/report/documents/csv_export.h"
 #include "server/report/documents/json_documents.h"
-#include "server/report/html/report.h"
+#include "server/report/documents/record.h"
 
 namespace calib::ctl {
 namespace {
@@ -53,7 +54,8 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
           {"fit.csv", report::FitCsv(view, predictions)},
           {"compare.json", report::ComparisonJson(id, report::Compare(view, predictions),
                                                   report::Curves(view, predictions))},
-          {"report.html", report::RenderReport(view)}};
+          {"record.json", report::RecordJson(view)},
+          {"posterior.tex", report::LatexTable(view)}};
 }
 
 void Declare(OptionList& list, ExportOptions& options) {
@@ -70,7 +72,11 @@ absl::StatusOr<int> Export(const CommonOptions& common, const ExportOptions& opt
   if (error) {
     return absl::PermissionDeniedError(options.output + " cannot be made: " + error.message());
   }
-  const auto files = Files(view);
+  auto files = Files(view);
+  if (CanReport()) {
+    ASSIGN_OR_RETURN(auto html, ReportFile(session->client(), options.campaign));
+    files.emplace_back("report.html", std::move(html));
+  }
   for (const auto& [name, content] : files) {
     RETURN_IF_ERROR(WriteFile((folder / name).string(), content));
   }

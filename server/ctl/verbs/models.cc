@@ -3,11 +3,11 @@
 #include <vector>
 
 #include "calib/return_if_error.h"
+#include "server/client/documents.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_story.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
@@ -40,7 +40,7 @@ absl::StatusOr<int> Models(const CommonOptions& common, const ModelsOptions& opt
   }
   std::vector<report::StoredDiagnosis> diagnoses;
   if (const std::string base = report::BaseOf(rivals); !base.empty()) {
-    ASSIGN_OR_RETURN(diagnoses, LoadDiagnoses(session->client(), base));
+    ASSIGN_OR_RETURN(diagnoses, client::DiagnosesOf(session->client(), base));
   }
   ASSIGN_OR_RETURN(const auto comparison, report::CompareModels(rivals, diagnoses));
   std::cout << (common.json ? report::ModelsJson(comparison) : ModelsText(comparison));

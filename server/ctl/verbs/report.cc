@@ -1,14 +1,12 @@
-#include "server/report/html/report.h"
-
 #include <iostream>
 #include <string>
 
 #include "calib/return_if_error.h"
-#include "server/client/load_view.h"
+#include "server/client/progress.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_story.h"
 #include "server/ctl/option_list.h"
+#include "server/ctl/report_file.h"
 #include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
 
@@ -27,13 +25,16 @@ void Declare(OptionList& list, ReportOptions& options) {
 
 absl::StatusOr<int> Report(const CommonOptions& common, const ReportOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
-  ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
-  ASSIGN_OR_RETURN(const auto story, LoadStory(session->client(), view));
-  RETURN_IF_ERROR(WriteFile(options.output, report::RenderReport(view, story)));
+  const auto make = [&] {
+    const client::BusyLine busy("writing the report of " + options.campaign);
+    return ReportFile(session->client(), options.campaign);
+  };
+  ASSIGN_OR_RETURN(const auto html, make());
+  RETURN_IF_ERROR(WriteFile(options.output, html));
   if (common.json) {
-    std::cout << "{\"campaign\": \"" << view.status.campaign() << "\", \"written\": true}\n";
+    std::cout << "{\"campaign\": \"" << options.campaign << "\", \"written\": true}\n";
   } else {
-    std::cout << "The report of " << view.status.campaign() << " is in " << options.output << ".\n";
+    std::cout << "The report of " << options.campaign << " is in " << options.output << ".\n";
   }
   return kDone;
 }
@@ -42,7 +43,7 @@ absl::StatusOr<int> Report(const CommonOptions& common, const ReportOptions& opt
 
 Verb ReportVerb() {
   return MakeVerb<ReportOptions>({.name = "report",
-                                  .description = "One self-contained HTML file with plots",
+                                  .description = "One self-contained HTML file with the figures of the live page",
                                   .example = "report c1 -o c1.html --state calib-state"},
                                  &Declare, &Report);
 }

@@ -18,8 +18,10 @@
 #include "server/ctl/live_page.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
+#include "server/ctl/terminal.h"
 #include "server/ctl/verb.h"
 #include "server/messages/read_words.h"
+#include "server/report/documents/fit_plots.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/views/warnings.h"
 
@@ -84,10 +86,12 @@ absl::StatusOr<int> PrintAnswer(client::Session& session, const std::string& cam
         report::ShapeOf(view.posterior, view.campaign.parameters, view.samples));
     return kDone;
   }
-  const report::Comparison comparison = report::Compare(view, report::PredictReadings(view));
+  const auto predictions = report::PredictReadings(view);
+  constexpr int kPlots = 3;  // the answer stays in sight
   std::cout << "\n"
             << PosteriorText(view.posterior, report::Warnings(view)) << "\n"
-            << ComparisonText(comparison);
+            << ComparisonText(report::Compare(view, predictions))
+            << report::FitPlots(report::Curves(view, predictions), kPlots, ThisTerminal());
   return kDone;
 }
 

@@ -17,6 +17,7 @@
 #include "calib/return_if_error.h"
 #include "server/client/child_process.h"
 #include "server/client/interrupt.h"
+#include "server/client/kept_grains.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/client/temporary_folder.h"
@@ -36,6 +37,7 @@ struct VtkOptions {
   std::vector<std::string> experiments{};  ///< empty: all with a packing
   std::optional<int> load_step{};
   std::string output;  ///< folder
+  bool keep = false;   ///< at the server too
 };
 
 void Declare(OptionList& list, VtkOptions& options) {
@@ -47,6 +49,8 @@ void Declare(OptionList& list, VtkOptions& options) {
             "folder, created if need be; one below it per experiment: open grains.pvd, "
             "contacts.pvd and cell.pvd in ParaView")
       .Required();
+  list.Flag("--keep", options.keep,
+            "some of the load steps are kept at the server too, for the live page to draw");
 }
 
 absl::StatusOr<v1::Sample> SampleOf(client::Client& client, const VtkOptions& options) {
@@ -194,10 +198,21 @@ absl::StatusOr<int> Vtk(const CommonOptions& common, const VtkOptions& options) 
       code = kFailed;
     }
     const std::string path = (std::filesystem::path(options.output) / name).string();
+    std::vector<int> kept;
+    if (options.keep && drawn.is_same && !drawn.load_steps.empty()) {
+      ASSIGN_OR_RETURN(kept, client::KeepGrains(client,
+                                                {.campaign = options.campaign,
+                                                 .sample = options.sample,
+                                                 .experiment = name},
+                                                path, drawn.load_steps));
+    }
     written.push_back({{"experiment", name}, {"folder", path}, {"load_steps", drawn.load_steps}});
+    if (options.keep) written.back()["kept"] = kept;
     if (!common.json) {
       std::cout << path << ": " << drawn.load_steps.size()
-                << " load step(s); open grains.pvd, contacts.pvd and cell.pvd in ParaView\n";
+                << " load step(s); open grains.pvd, contacts.pvd and cell.pvd in ParaView"
+                << (kept.empty() ? "" : absl::StrCat("; ", kept.size(), " kept for the page"))
+                << "\n";
     }
   }
   if (common.json) {

@@ -3,17 +3,22 @@
 #include <string>
 
 #include "calib/return_if_error.h"
+#include "server/client/load_view.h"
 #include "server/client/progress.h"
 #include "server/client/session.h"
 #include "server/client/standstill_notice.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
+#include "server/ctl/terminal.h"
 #include "server/ctl/verb.h"
 #include "server/messages/read_words.h"
+#include "server/report/documents/fit_plots.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
+
+constexpr int kPlots = 3;  // what is said of the end stays in sight
 
 struct WatchOptions {
   std::string campaign;
@@ -49,6 +54,11 @@ absl::StatusOr<int> Watch(const CommonOptions& common, const WatchOptions& optio
   const bool good = last && messages::StateOf(*last) == campaign::CampaignState::kFinished;
   if (last && !common.json) {
     std::cout << last->campaign() << " is " << client::ProgressText(*last) << ".\n";
+    if (good && !messages::RunsRowsOnly(*last)) {
+      ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
+      std::cout << report::FitPlots(report::Curves(view, report::PredictReadings(view)), kPlots,
+                            ThisTerminal());
+    }
   }
   return good ? kDone : kFailed;
 }

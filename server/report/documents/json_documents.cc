@@ -7,6 +7,7 @@
 
 #include "server/campaign/file/text/data_file.h"
 #include "server/messages/read_words.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::report {
 namespace {
@@ -410,6 +411,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c,
                {"trends", trends},
                {"discrepancy", discrepancy},
                {"prior_conflicts", conflicts},
+               {"where_it_fails", WhereItFails(c)},
                {"at_bound", c.at_bound},
                {"experiments", experiments},
                {"warnings", c.warnings},

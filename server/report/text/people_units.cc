@@ -103,6 +103,17 @@ std::string ShareExplained(double share) {
   return share > 0 && share < kLeast ? "< 0.1 %" : Percent(share, 2);
 }
 
+std::string StrengthInWords(const std::map<std::string, double>& amplitude,
+                            const std::map<std::string, std::string>& units) {
+  std::string text;
+  for (const auto& [name, value] : amplitude) {
+    const auto unit = units.find(name);
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name,
+                        NumberWithUnit(value, name, unit == units.end() ? "1" : unit->second, 3));
+  }
+  return text;
+}
+
 std::string Duration(double seconds) {
   if (!(seconds >= 0)) return "–";
   const auto whole = static_cast<long>(std::llround(seconds));

@@ -3,6 +3,7 @@
 // degrees for angles.
 
 #include <cstdint>
+#include <map>
 #include <string>
 
 namespace calib::report {
@@ -38,6 +39,10 @@ std::string ShareExplained(double share);
 /// Number with its display unit: "4.1 GPa".
 std::string NumberWithUnit(double value, const std::string& name, const std::string& si_unit,
                            int digits = 4);
+
+/// "stiffness = 8.2 kN m/rad, friction = 0.1", in the units given by dotted parameter.
+std::string StrengthInWords(const std::map<std::string, double>& amplitude,
+                            const std::map<std::string, std::string>& units);
 
 /// "1 h 20 min", "35 s".
 std::string Duration(double seconds);

@@ -70,12 +70,8 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   // The report shows what was concluded, once.
   ASSERT_EQ(Call("report c1 --state s -o r.html").code, 0);
   const std::string report = Read("r.html");
-  EXPECT_NE(report.find("<strong>The model is adequate"), std::string::npos);
-  EXPECT_EQ(report.find("rules of an earlier build"), std::string::npos);
-  EXPECT_NE(
-      report.find(json["detectable"].empty() ? "Not to be detected" : "What would have been found"),
-      std::string::npos);
-  EXPECT_NE(report.find("Diagnosis of 2"), std::string::npos) << "the day";
+  EXPECT_NE(report.find("campaigns/c1/diagnosis"), std::string::npos);
+  EXPECT_NE(report.find("The model is adequate"), std::string::npos);
 
   // Another race is another design.
   const std::string left_out = json["candidates"][0]["effect"];

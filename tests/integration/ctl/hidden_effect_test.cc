@@ -87,7 +87,8 @@ TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
 // A measurement of the model itself on another packing of another number of grains. Eight packings:
 // four know their scatter to 40 % only, and controls fail with them
 // (deploy/bench/hidden-effects.d).
-TEST_F(HiddenEffect, IsNotFoundWhereNothingIsHidden) {
+using HiddenEffectSlow = HiddenEffect;
+TEST_F(HiddenEffectSlow, IsNotFoundWhereNothingIsHidden) {
   const std::string campaign = Read("campaign.yaml");
   Write("other.yaml",
         With(With(campaign, "particles: 200", "particles: 230"), "seed: 1}", "seed: 91}"));

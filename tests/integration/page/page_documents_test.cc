@@ -64,6 +64,33 @@ TEST_F(LivePageTest, EveryDocumentIsThatOfCalibctl) {
   EXPECT_EQ(curves["runs"][0]["rank"], 1);
   const Json posterior = Document("campaigns/c1/posterior");
   EXPECT_FALSE(posterior["parameters"]["young_modulus"]["prior_density"].empty());
+
+  // A packing that was drawn is kept where that is asked for.
+  const std::string sample = std::to_string(curves["runs"][0]["sample"].get<int>());
+  const std::string path = "campaigns/c1/grains/" + sample;
+  ASSERT_EQ(Ask("vtk c1 " + sample + " -o drawn", "").code, 0) << Read("err");
+  EXPECT_EQ(Get("/api/v1/" + path).status, 404);
+  ASSERT_EQ(Ask("vtk c1 " + sample + " --keep -o drawn", "").code, 0) << Read("err");
+  ASSERT_TRUE(Eventually(kPatience, [&] { return Get("/api/v1/" + path).status == 200; }));
+  const Json packing = Document(path);
+  EXPECT_EQ(packing["load_steps"], Json({0, 1, 2}));
+  EXPECT_EQ(packing["load_step"], 2);
+  const std::size_t grains = packing["grains"]["radius"].size();
+  EXPECT_GT(grains, 10U);
+  for (const char* name : {"x", "y", "z", "speed", "coordination"}) {
+    EXPECT_EQ(packing["grains"][name].size(), grains) << name;
+  }
+  // Every contact counts once for each of its two grains.
+  const Json& contacts = packing["contacts"];
+  EXPECT_EQ(contacts["normal_force"].size(), contacts["i"].size());
+  std::vector<int> counted(grains, 0);
+  for (const char* end : {"i", "j"}) {
+    for (const Json& grain : contacts[end]) ++counted.at(grain.get<std::size_t>());
+  }
+  EXPECT_EQ(packing["grains"]["coordination"], Json(counted));
+  EXPECT_EQ(Document(path + "?load_step=1")["load_step"], 1);
+  EXPECT_EQ(Get("/api/v1/" + path + "?load_step=7").status, 404);
+  EXPECT_EQ(Get("/api/v1/" + path + "?experiment=nosuch").status, 404);
 }
 
 TEST_F(LivePageTest, WhatIsNotThereIsSaidInASentence) {

@@ -94,6 +94,7 @@ export interface Posterior {
   ess: Maybe;
   posterior_from: string | null;
   predictive_p: Maybe;
+  noise_scale?: { observables: string[]; q05: Maybe; q50: Maybe; q95: Maybe }[];
   path: PathPoint[];
   draws?: { parameters: string[]; values: number[][] } | null;
   warnings: string[];
@@ -176,6 +177,7 @@ export interface Drift {
 
 export interface Comparison {
   campaign: string;
+  where_it_fails?: string[];
   rms_error: Maybe;
   reduced_chi2: Maybe;
   p_value: Maybe;
@@ -218,13 +220,16 @@ export interface Diagnosis {
   in_doubt: boolean;
   warnings: string[];
   effects: string[];
-  probabilities: { effects: string[]; probability: number }[];
-  none_of_these: Maybe;
-  credible_set: string[][];
-  families: { effects: string[]; probability: number }[];
+  probabilities?: { effects: string[]; probability: number }[]; // of earlier builds and of the adequacy alone there are none
+  none_of_these?: Maybe;
+  credible_set?: string[][];
+  families?: { effects: string[]; probability: number }[];
   candidates: Candidate[];
+  detectable?: Record<string, Record<string, Maybe>>;
+  undetectable?: { effect: string; reason: string }[];
+  not_excitable?: { effect: string; reason: string }[];
   units: Record<string, string>;
-  next_experiment: NextExperiment | null;
+  next_experiment?: NextExperiment | null;
   only_adequacy?: boolean;
   adequacy: { p_value: Maybe; rms: Maybe; packings: Maybe };
 }
@@ -234,7 +239,6 @@ export interface ImprovementStep {
   effects: string[];
   probability: Maybe;
   rms_error: Maybe;
-  left_out_rms_error?: Maybe;
   heldout_rms_error: Maybe;
   verdict: string | null;
   reason: string;
@@ -286,4 +290,46 @@ export interface Grains {
   cell: { min: number[]; max: number[] };
   grains: { x: number[]; y: number[]; z: number[]; radius: number[]; speed: number[]; coordination: number[] };
   contacts: { i: number[]; j: number[]; normal_force: number[] };
+}
+
+export interface Iteration {
+  iteration: number;
+  ess: Maybe;
+  pareto_k: Maybe;
+  log_evidence: Maybe;
+  log_evidence_se: Maybe;
+  model_evaluations: number;
+  parameters: { [name: string]: { mean: Maybe; q05: Maybe; q95: Maybe; unit: string } };
+}
+
+/// What was done. Of a report.
+export interface Made {
+  campaign: string;
+  entries: [term: string, text: string][];
+  files: { path: string; sha256: string }[];
+  campaign_file: string;
+  iterations: Iteration[];
+  methods: { sentences: string[]; references: string[] };
+  latex: string;
+}
+
+type ByParameter<T> = { [parameter: string]: T } | null;
+
+export interface MovedQuantity {
+  experiment: string;
+  quantity: string;
+  unit: string;
+  runs: number;
+  explained: Maybe;
+  total: ByParameter<{ index: Maybe; error: Maybe }>; // null where the priors are tied
+  prior: { correlation: ByParameter<{ rank: Maybe; error: Maybe }> };
+  posterior: { correlation: ByParameter<{ rank: Maybe; error: Maybe }> } | null;
+}
+
+export interface Sensitivity {
+  campaign: string;
+  parameters: string[];
+  independent: boolean;
+  quantities: MovedQuantity[];
+  left_out: string[];
 }

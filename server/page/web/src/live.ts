@@ -18,7 +18,7 @@ interface CampaignEvent {
 }
 
 // What follows from the samples of whole iterations, and from what was concluded about them.
-const kConclusions = ["posterior", "compare", "diagnosis", "improvement"];
+const kConclusions = ["posterior", "compare", "diagnosis", "improvement", "grains"];
 // How often what grows with every run is asked for again [ms]: no eye needs it faster, and each question costs the server.
 const kStatus = 2000;
 const kLists = 5000;

@@ -1,10 +1,10 @@
-// A report: the same views of documents that stand in the file itself, one below the other, what decides first. The file has
-// page.css and page.js inline, and in <script type="application/json" id="documents"> what `Embedded` says, `<` as \u003c.
+// A report: the same views of documents that stand in the file itself, one below the other, what decides first. The file is
+// made by server/report/documents/report_page.cc: page.css and page.js inline, `Embedded` in the element "documents".
 
 import { Answers } from "./answers.ts";
 import { append, h } from "./dom.ts";
 import type { Improvement, Shown } from "./documents.ts";
-import { drawAll } from "./figures/frame.ts";
+import { drawAll, drawSoon } from "./figures/frame.ts";
 import { dateText, nameForPeople } from "./units.ts";
 import { errorView } from "./views/error.ts";
 import { fitView } from "./views/fit.ts";
@@ -12,6 +12,8 @@ import { misfitView } from "./views/misfit.ts";
 import { missingView } from "./views/missing.ts";
 import { parametersView } from "./views/parameters.ts";
 import { progressView } from "./views/progress.ts";
+import { recordView } from "./views/record.ts";
+import { sensitivityView } from "./views/sensitivity.ts";
 import { stateBadge, type View } from "./views/view.ts";
 
 /// documents: by their paths below /api/v1, as "campaigns/c1/compare".
@@ -19,6 +21,8 @@ export interface Embedded {
   campaign: string;
   documents: Record<string, unknown>;
 }
+
+const kInSightFirst = 300; // ms
 
 export function showReport({ campaign, documents }: Embedded): void {
   const answers = new Answers(async (path) => {
@@ -43,7 +47,7 @@ export function showReport({ campaign, documents }: Embedded): void {
     if (documents[`campaigns/${of}${needs}`] === undefined) return;
     const root = h("div", { class: "view" });
     append(main, [title === null ? null : h("h2", { class: "part" }, title), root]);
-    view(root, { answers, campaign: of, options: new URLSearchParams(), choose: () => {} });
+    view(root, { answers, campaign: of, options: new URLSearchParams(), inReport: true, choose: () => {} });
   };
   const improved = last !== undefined && last.campaign !== campaign && documents[`campaigns/${last.campaign}/compare`] !== undefined;
   add(fitView, campaign, "/compare", improved ? "Before" : null);
@@ -52,6 +56,10 @@ export function showReport({ campaign, documents }: Embedded): void {
   add(missingView, campaign, "/diagnosis");
   add(misfitView, campaign, "/compare");
   add(parametersView, campaign, "/posterior");
+  add(sensitivityView, campaign, "/sensitivity");
   add(progressView, campaign, "");
+  add(recordView, campaign, "/record");
+  // Whoever searches, saves or prints has all of it.
+  setTimeout(() => drawSoon(document), kInSightFirst);
   addEventListener("beforeprint", () => drawAll(document));
 }

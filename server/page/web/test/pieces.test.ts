@@ -7,6 +7,7 @@ import { travelled } from "../src/figures/residuals.ts";
 import { viridis } from "../src/grains/colorings.ts";
 import { linkTo, readRoute } from "../src/route.ts";
 import { familyRows } from "../src/views/family.ts";
+import { spaced } from "../src/views/spaced.ts";
 
 test("a link leads back to where it says, whatever the campaign is called", () => {
   for (const campaign of ["c1", "a b/c", "<script>", "ä%2F"]) {
@@ -60,4 +61,12 @@ test("campaigns stand below the one they come from; many are folded, calibrated 
   const names = (unfolded: string[]): string[] => familyRows(list, new Set(unfolded)).map(({ status: s, depth }) => `${depth}${s.campaign}`);
   assert.deepEqual(names([]), ["0c1", "1c9", "0c20", "0c21"]);
   assert.equal(names(["c1"]).length, 11);
+});
+
+test("of many iterations the first and the last are among those shown", () => {
+  const all = Array.from({ length: 111 }, (_, i) => i);
+  assert.equal(spaced(all).length, 20);
+  assert.equal(spaced(all)[0], 0);
+  assert.equal(spaced(all).at(-1), 110);
+  assert.deepEqual(spaced([3, 4]), [3, 4]);
 });

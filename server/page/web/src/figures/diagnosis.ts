@@ -17,8 +17,8 @@ export function modelName(effects: readonly string[]): string {
 const kMostModels = 10;
 
 export function probabilityFigure(diagnosis: Diagnosis): Figure {
-  const inSet = new Set(diagnosis.credible_set.map((effects) => effects.join("\n")));
-  const all = [...diagnosis.probabilities, { effects: ["none_of_these"], probability: diagnosis.none_of_these ?? 0 }]
+  const inSet = new Set((diagnosis.credible_set ?? []).map((effects) => effects.join("\n")));
+  const all = [...(diagnosis.probabilities ?? []), { effects: ["none_of_these"], probability: diagnosis.none_of_these ?? 0 }]
     .map(({ effects, probability }) => ({ name: modelName(effects), probability, credible: inSet.has(effects.join("\n")) }))
     .sort((a, b) => b.probability - a.probability);
   const named = ["none of these", "the model as it is"];
@@ -148,7 +148,6 @@ export function stepsFigure(improvement: Improvement): Figure {
   const { steps } = improvement;
   const series = [
     { name: "fitted", values: steps.map(({ rms_error }) => rms_error), color: "var(--s0)" },
-    { name: "left out", values: steps.map(({ left_out_rms_error }) => left_out_rms_error ?? null), color: "var(--s2)" },
     { name: "held out", values: steps.map(({ heldout_rms_error }) => heldout_rms_error), color: "var(--s1)" },
   ].filter(({ values }) => values.some(finite));
   const labels = steps.map(({ effects, campaign }) => `${effects.length === 0 ? "base" : effects.map((name) => `+ ${nameForPeople(name)}`).join("\n")}\n${campaign}`);
@@ -181,8 +180,8 @@ export function stepsFigure(improvement: Improvement): Figure {
   return {
     id: "steps", title, description, key, draw,
     table: () => ({
-      columns: ["step", "campaign", "effects", "rms_error", "left_out_rms_error", "heldout_rms_error", "probability", "verdict"].map((name) => ({ name })),
-      rows: steps.map((s, i) => [i, s.campaign, s.effects.join(" "), s.rms_error, s.left_out_rms_error ?? null, s.heldout_rms_error, s.probability, s.verdict ?? ""]),
+      columns: ["step", "campaign", "effects", "rms_error", "heldout_rms_error", "probability", "verdict"].map((name) => ({ name })),
+      rows: steps.map((s, i) => [i, s.campaign, s.effects.join(" "), s.rms_error, s.heldout_rms_error, s.probability, s.verdict ?? ""]),
     }),
   };
 }

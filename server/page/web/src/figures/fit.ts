@@ -25,8 +25,9 @@ function abscissaOf(experiment: FittedExperiment, name: string): Abscissa {
   return { name, unit, values, sd, median: medianOf(observable), runs };
 }
 
-const medianOf = (observable: FittedObservable): Maybe[] | null =>
-  observable.bands?.q50 ?? observable.bands?.mean ?? null;
+const known = (values: Maybe[] | null | undefined): Maybe[] | null => (values?.some(finite) ? values : null);
+
+const medianOf = ({ bands }: FittedObservable): Maybe[] | null => known(bands?.q50) ?? known(bands?.mean);
 
 const ended = (run: Run): boolean => run.status === "finished";
 
@@ -53,9 +54,9 @@ export function fitFigure(experiment: FittedExperiment, observable: FittedObserv
   );
 
   const key: KeyEntry[] = [{ mark: "dot", color: "var(--measured)", text: "measured, ± 1 sd" }];
-  if (median !== null) key.push({ mark: "line", color, text: bands?.q50 ? "median" : "mean" });
-  if (ofControl && bands?.q25) key.push({ mark: "band", color, text: bands.q025 ? "50 and 95 %" : "50 and 90 %" });
-  else if (ofControl && bands?.q05) key.push({ mark: "band", color, text: "5 to 95 %" });
+  if (median !== null) key.push({ mark: "line", color, text: known(bands?.q50) ? "median" : "mean" });
+  if (ofControl && known(bands?.q25)) key.push({ mark: "band", color, text: bands?.q025 ? "50 and 95 %" : "50 and 90 %" });
+  else if (ofControl && known(bands?.q05)) key.push({ mark: "band", color, text: "5 to 95 %" });
   if (experiment.runs.some(ended)) key.push({ mark: "faint", color: "var(--run)", text: "best runs" });
   if (experiment.runs.some((run) => !ended(run))) key.push({ mark: "dash", color: "var(--run)", text: "running, stopped early" });
 

@@ -7,6 +7,7 @@ import { csvText, type Figure, type KeyEntry, type Table } from "./figure.ts";
 
 const kNear = "400px"; // drawn before it is seen
 const kSeen = new WeakMap<Element, () => void>();
+const kNow = new WeakMap<Element, () => void>();
 const kWhenSeen = new IntersectionObserver(
   (entries) => {
     for (const entry of entries) if (entry.isIntersecting) kSeen.get(entry.target)?.();
@@ -100,6 +101,9 @@ export function frameOf(first: Figure): Frame {
     plan();
   });
   kWhenSeen.observe(element);
+  kNow.set(element, () => {
+    if (drawnWidth === 0) draw();
+  });
   kWidths.set(picture, () => {
     if (Math.floor(picture.clientWidth) !== drawnWidth) plan();
   });
@@ -114,9 +118,14 @@ export function frameOf(first: Figure): Frame {
   };
 }
 
-/// Draws now whatever of the page has not come into sight, for paper.
-export function drawAll(root: ParentNode): void {
+/// Draws whatever has not come into sight, one figure a task.
+export function drawSoon(root: ParentNode): void {
   for (const figure of root.querySelectorAll("figure")) kSeen.get(figure)?.();
+}
+
+/// Draws now, in this task, whatever of the page has not come into sight: for paper.
+export function drawAll(root: ParentNode): void {
+  for (const figure of root.querySelectorAll("figure")) kNow.get(figure)?.();
 }
 
 export function tableElement(caption: string, table: Table): HTMLTableElement {

@@ -8,14 +8,12 @@ import { chanceText, nameForPeople, numberText } from "../units.ts";
 import { absent, copyable, FigureList, valueOf, watchAll, type View } from "./view.ts";
 
 export function stepsTable(improvement: Improvement): HTMLElement {
-  const leftOut = improvement.steps.some(({ left_out_rms_error: error }) => error != null);
   return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Steps" }, h("table", {},
-    h("thead", {}, h("tr", {}, ["model", "fitted [sd]", ...(leftOut ? ["left out [sd]"] : []), "held out [sd]", "probability", "verdict", "why"].map((name) =>
+    h("thead", {}, h("tr", {}, ["model", "fitted [sd]", "held out [sd]", "probability", "verdict", "why"].map((name) =>
       h("th", { scope: "col", class: ["model", "verdict", "why"].includes(name) ? "text" : "" }, name)))),
     h("tbody", {}, improvement.steps.map((s) => h("tr", { "data-campaign": s.campaign },
       h("th", { scope: "row", class: "name" }, h("a", { href: linkTo(s.campaign, "fit") }, modelName(s.effects)), h("span", { class: "id" }, s.campaign)),
       h("td", {}, value(s.rms_error, numberText(s.rms_error, 3))),
-      leftOut ? h("td", {}, value(s.left_out_rms_error, numberText(s.left_out_rms_error, 3))) : null,
       h("td", {}, value(s.heldout_rms_error, numberText(s.heldout_rms_error, 3))),
       h("td", {}, value(s.probability, chanceText(s.probability))),
       h("td", { class: "text" }, nameForPeople(s.verdict ?? "–")),
@@ -33,7 +31,7 @@ export const errorView: View = (root, context) => {
     const improvement = valueOf<Improvement>(answer);
     if (improvement === null) {
       replace(top, absent(answer, [
-        "The error of fitted, left-out and held-out data, effect by effect, appears when the model has been improved:",
+        "The error of fitted and held-out data, effect by effect, appears when the model has been improved:",
         copyable(`calibctl improve ${id}`, "the command"),
       ]));
       return;

@@ -79,8 +79,8 @@ export const grainsView: View = (root, context) => {
       if (answer.state === "here") {
         void showGrains(answer.value);
       } else if (answer.state === "none") {
-        replace(holder, empty("No packing of this run was kept", "It is run again, with the same bits, and written for ParaView by:",
-          copyable(`calibctl vtk ${campaign} ${sample} -o grains`, "the command"), answer.sentence));
+        replace(holder, empty("No packing of this run was kept", "It is run again, with the same bits, drawn here and written for ParaView by:",
+          copyable(`calibctl vtk ${campaign} ${sample} --keep -o grains`, "the command"), answer.sentence));
       } else if (answer.state === "failed") {
         replace(holder, empty("The server could not answer", answer.sentence));
       }

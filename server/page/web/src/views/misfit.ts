@@ -19,6 +19,11 @@ export function misfitFigures(comparison: Comparison): Figure[] {
   ];
 }
 
+function failures({ where_it_fails: sentences, p_value: p }: Comparison): HTMLElement | null {
+  if (sentences === undefined || sentences.length === 0) return p === null ? null : h("p", {}, "No stage of loading stands out.");
+  return h("ul", { class: "failures" }, sentences.map((sentence) => h("li", {}, sentence)));
+}
+
 export const misfitView: View = (root, context) => {
   const sentence = h("div", {});
   const figures = new FigureList("figures wide-first");
@@ -28,7 +33,7 @@ export const misfitView: View = (root, context) => {
     const drawn = comparison === null ? [] : misfitFigures(comparison);
     replace(sentence, comparison === null
       ? absent(answer, "Residuals appear after the first iteration.")
-      : drawn.length === 0 ? empty("No residuals yet", "They appear after the first iteration.", comparison.note) : fitSentence(comparison));
+      : drawn.length === 0 ? empty("No residuals yet", "They appear after the first iteration.", comparison.note) : [fitSentence(comparison), failures(comparison)]);
     figures.update(drawn);
   });
 };

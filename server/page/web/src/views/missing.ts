@@ -63,27 +63,48 @@ export const missingView: View = (root, context) => {
     replace(top,
       h("p", { class: "verdict", "data-value": diagnosis.verdict }, kVerdicts[diagnosis.verdict] ?? diagnosis.verdict),
       h("p", { class: "answer" }, diagnosis.sentence),
+      byEarlierRules(diagnosis) ? h("p", {}, "By rules of an earlier build. To ask again:", copyable(`calibctl diagnose ${id}`, "the command")) : null,
+      diagnosis.only_adequacy ? h("p", { class: "sub" }, "Only whether the model is adequate was asked, not which effect would fit better.") : null,
       warnings([...(diagnosis.in_doubt ? ["This rests on errors that the readings contradict, or on few readings."] : []), ...diagnosis.warnings]),
       h("dl", { class: "readings" },
-        h("div", { class: "reading" }, h("dt", {}, "credible set, 95 %"), h("dd", {}, h("ul", { class: "set" },
+        diagnosis.credible_set === undefined ? null : h("div", { class: "reading" }, h("dt", {}, "credible set, 95 %"), h("dd", {}, h("ul", { class: "set" },
           diagnosis.credible_set.map((effects) => h("li", {}, modelName(effects)))))),
-        diagnosis.families.length === 0 ? null : h("div", { class: "reading" }, h("dt", {}, "one of these acts"), h("dd", {}, h("ul", { class: "set" },
-          diagnosis.families.map(({ effects, probability }) => h("li", {}, effects.map(nameForPeople).join(" or "), " ", value(probability, chanceText(probability))))))),
-        h("div", { class: "reading" }, h("dt", {}, "the model as it is passes"), h("dd", {}, value(diagnosis.adequacy.p_value, `p = ${numberText(diagnosis.adequacy.p_value, 2)}`))),
+        (diagnosis.families ?? []).length === 0 ? null : h("div", { class: "reading" }, h("dt", {}, "one of these acts"), h("dd", {}, h("ul", { class: "set" },
+          (diagnosis.families ?? []).map(({ effects, probability }) => h("li", {}, effects.map(nameForPeople).join(" or "), " ", value(probability, chanceText(probability))))))),
+        h("div", { class: "reading" }, h("dt", {}, "adequacy of the model as it is"), h("dd", {}, value(diagnosis.adequacy.p_value, `p = ${numberText(diagnosis.adequacy.p_value, 2)}`))),
       ));
-    probabilities.update(diagnosis.probabilities.length === 0 ? [] : [probabilityFigure(diagnosis)]);
+    probabilities.update((diagnosis.probabilities ?? []).length === 0 ? [] : [probabilityFigure(diagnosis)]);
     replace(table, candidateTable(diagnosis));
     const experiments = valueOf<Comparison>(compared)?.experiments ?? [];
     const drawn = diagnosis.candidates.filter(({ curves }) => curves.length > 0).slice(0, kDrawnCandidates);
     const observables = [...new Set(drawn.flatMap(({ curves }) => curves.map(({ observable }) => observable)))];
     signatures.update(experiments.length === 0 ? [] : observables.map((name) => signatureFigure(experiments, name, drawn)));
-    replace(next, nextSection(diagnosis, shown));
+    replace(next, notNamed(diagnosis), nextSection(diagnosis, context.inReport ? null : shown?.next_command ?? null));
   });
 };
 
-function nextSection(diagnosis: Diagnosis, shown: Shown | null): HTMLElement {
-  const experiment = diagnosis.next_experiment;
-  const command = shown?.next_command ?? null;
+const byEarlierRules = ({ probabilities, only_adequacy: only }: Diagnosis): boolean => probabilities === undefined && !only;
+
+/// Effects that are no candidates, by the reason.
+function reasons(title: string, list: readonly { effect: string; reason: string }[]): HTMLElement | null {
+  if (list.length === 0) return null;
+  const byReason = new Map<string, string[]>();
+  for (const { effect, reason } of list) byReason.set(reason, [...(byReason.get(reason) ?? []), nameForPeople(effect)]);
+  return h("details", {}, h("summary", {}, title), h("ul", {}, [...byReason].map(([reason, effects]) => h("li", {}, `${effects.join(", ")}: ${reason}`))));
+}
+
+function notNamed(diagnosis: Diagnosis): HTMLElement {
+  const seen = Object.entries(diagnosis.detectable ?? {});
+  return h("section", {},
+    seen.length === 0 ? null : h("details", {}, h("summary", {}, "What these tests would have shown, with 90 % power"),
+      h("ul", {}, seen.map(([effect, strengths]) => h("li", {}, `${nameForPeople(effect)}: `,
+        Object.entries(strengths).map(([name, strength]) => `${nameForPeople(name.slice(effect.length + 1) || name)} ${quantityText(strength, name, diagnosis.units[name] ?? "1", 2)}`).join(", "))))),
+    reasons("Not to be detected by these tests", diagnosis.undetectable ?? []),
+    reasons("Not tried", diagnosis.not_excitable ?? []));
+}
+
+function nextSection(diagnosis: Diagnosis, command: string | null): HTMLElement {
+  const experiment = diagnosis.next_experiment ?? null;
   return h("section", {}, h("h2", {}, "What next"),
     experiment === null ? null : [
       h("h3", {}, "The next experiment"),

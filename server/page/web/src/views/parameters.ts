@@ -63,6 +63,8 @@ export const parametersView: View = (root, context) => {
       value(posterior.log_evidence, numberText(posterior.log_evidence, 5)),
       posterior.log_evidence_se === null ? "." : [" ± ", value(posterior.log_evidence_se, numberText(posterior.log_evidence_se, 2)), "."],
       posterior.predictive_p === null ? null : [" Data like these or further off under the model: ", value(posterior.predictive_p, chanceText(posterior.predictive_p)), "."]),
+      (posterior.noise_scale ?? []).map(({ observables, q05, q50, q95 }) => h("p", {}, `Errors of ${observables.map(nameForPeople).join(", ")} are `,
+        value(q50, numberText(q50, 2)), ` times as large as stated (5 to 95 %: ${numberText(q05, 2)} to ${numberText(q95, 2)}).`)),
       warnings(posterior.warnings), parameterTable(posterior));
     const laid: NamedPosterior[] = [{ name: nameIn(lineage, id), posterior }];
     rest.forEach((answer, i) => {

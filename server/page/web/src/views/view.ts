@@ -11,6 +11,7 @@ export interface Context {
   answers: Answers;
   campaign: string;
   options: URLSearchParams;
+  inReport?: boolean; // nobody is there to go on with anything
   /// Goes to the same view with this option; empty: without it.
   choose(name: string, value: string): void;
 }
