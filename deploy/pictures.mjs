@@ -21,7 +21,7 @@ await tab.evaluate((of) => {
     const one = document.querySelectorAll(of)[0]; // the first moves away
     one.querySelector(".tools").remove();
     one.querySelector("figcaption").remove();
-    one.querySelector("h3").textContent = `${word}: ${one.querySelector("h3").textContent}, held out`;
+    one.querySelector("h3").textContent = `${word}: the held-out test`;
     row.appendChild(one);
   });
   document.querySelector("main").replaceChildren(row);

@@ -73,7 +73,7 @@ export const grainsView: View = (root, context) => {
       const steps = answer.state === "here" ? answer.value.load_steps.map(String) : [];
       replace(choosers,
         select("sample", "Run", sample, samples.map((one, i) => [one, best.includes(Number(one)) ? `${one} (best ${i + 1})` : one])),
-        experiments.length > 1 ? select("experiment", "Experiment", options.get("experiment") ?? "", experiments.map((one) => [one.experiment, one.experiment])) : null,
+        experiments.length > 1 ? select("experiment", "Experiment", options.get("experiment") ?? (answer.state === "here" ? answer.value.experiment : ""), experiments.map((one) => [one.experiment, one.experiment])) : null,
         steps.length > 1 ? select("load_step", "Load step", String(answer.state === "here" ? answer.value.load_step : ""), steps.map((step) => [step, step])) : null,
         select("color", "Colour", coloring, kColorings.map((name) => [name, name === "force" ? "contact forces" : name])));
       if (answer.state === "here") {
