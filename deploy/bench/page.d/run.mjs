@@ -130,8 +130,9 @@ async function main() {
   for (let round = 0; round < kRounds; ++round) {
     for (const streams of [0, kStreams]) {
       const end = await eventStreams(http, token, streams);
-      const seen = await load(asked[1], tokenFile, ["--rate", `${kStatesPerSecond}`, "--warm-up", "3", "--seconds", "15", "--samples", `${2000 + 2 * round + (streams > 0)}`]);
+      const seen = await load(asked[1], tokenFile, ["--rate", `${kStatesPerSecond}`, "--warm-up", "3", "--seconds", "15", "--samples", `${200 + 2 * round + (streams > 0)}`]);
       end();
+      await calibctl(...asked, "cancel", seen.campaign);
       console.log(`| ${streams} event streams | ${seen.p50_ms.toFixed(1)} | ${seen.p99_ms.toFixed(1)} |`);
     }
   }
