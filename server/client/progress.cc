@@ -35,6 +35,8 @@ std::string ProgressText(const v1::CampaignStatus& s) {
   std::string text = fmt::format("iteration {}/{}", s.iteration() + 1, s.max_iterations());
   text += fmt::format("  {}  {}/{} samples", Bar(s.samples_done(), s.samples()), s.samples_done(),
                       s.samples());
+  // Audited or run again on other packings, or what follows is computed.
+  if (s.samples() > 0 && s.samples_done() == s.samples()) text += "  concluding";
   if (s.samples_running() > 0) text += fmt::format("  {} running", s.samples_running());
   if (s.samples_resting() > 0) text += fmt::format("  {} resting", s.samples_resting());
   if (s.samples_stopped_early() > 0) {

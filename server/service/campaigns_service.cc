@@ -100,7 +100,7 @@ void CampaignsService::FinishWithStatus(Unary* reactor, std::int64_t campaign,
                waits = core_.WaitsFor()] {
     auto reader = core_.Read();
     Answer(reactor,
-           reader.ok() ? StatusOf(*reader, campaign, live, waits)
+           reader.ok() ? StatusOf(*reader, campaign, live, waits, &finished_)
                        : absl::StatusOr<v1::CampaignStatus>(reader.status()),
            reply);
   });
@@ -128,7 +128,7 @@ grpc::ServerUnaryReactor* CampaignsService::List(Context* context, const v1::Lis
           [this, reactor, reply, live = core_.scheduler().AllLive(), waits = core_.WaitsFor()] {
             auto reader = core_.Read();
             Answer(reactor,
-                   reader.ok() ? ListOf(*reader, live, waits)
+                   reader.ok() ? ListOf(*reader, live, waits, &finished_)
                                : absl::StatusOr<v1::ListReply>(reader.status()),
                    reply);
           });

@@ -11,6 +11,7 @@
 #include "server/service/calls.h"
 #include "server/service/core.h"
 #include "server/service/guard.h"
+#include "server/service/queries.h"
 #include "server/service/requests.h"
 #include "server/service/state_pieces.h"
 #include "server/service/submission.h"
@@ -98,6 +99,7 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
                            const v1::ControlRequest* request, v1::CampaignStatus* reply,
                            const Act& act);
 
+  FinishedStatuses finished_;
   Core& core_;
   const Site site_;
   ToldExperiments told_;

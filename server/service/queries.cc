@@ -168,10 +168,35 @@ absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id) {
       absl::StrCat("there is no campaign \"", id, "\" (ids are like c1; see list)"));
 }
 
+std::optional<v1::CampaignStatus> FinishedStatuses::Find(
+    const store::CampaignRecord& record) const {
+  if (record.progress.state != CampaignState::kFinished) return std::nullopt;
+  const absl::MutexLock lock(&mutex_);
+  const auto found = kept_.find(record.submitted.id);
+  if (found == kept_.end() || found->second.iteration != record.progress.iteration) {
+    return std::nullopt;
+  }
+  return found->second.status;
+}
+
+void FinishedStatuses::Keep(const store::CampaignRecord& record,
+                            const v1::CampaignStatus& status) {
+  if (record.progress.state != CampaignState::kFinished) return;
+  const absl::MutexLock lock(&mutex_);
+  kept_[record.submitted.id] = {.iteration = record.progress.iteration, .status = status};
+}
+
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live,
-                                            const std::string& waits) {
+                                            const std::string& waits, FinishedStatuses* finished) {
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  const bool may_keep = finished != nullptr && !live.has_value();
+  if (may_keep) {
+    if (auto kept = finished->Find(record)) {
+      kept->set_server_waits(waits);
+      return *std::move(kept);
+    }
+  }
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
   ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
@@ -217,19 +242,21 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_parent(std::move(origin.parent));
   status.set_purpose(std::move(origin.purpose));
   status.mutable_effects()->Add(origin.effects.begin(), origin.effects.end());
+  if (may_keep) finished->Keep(record, status);
   return status;
 }
 
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live,
-                                     const std::string& waits) {
+                                     const std::string& waits, FinishedStatuses* finished) {
   ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   v1::ListReply list;
   for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;
     const auto known = live.find(id);
     auto status = Outgoing(StatusOf(
-        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second), waits));
+        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second), waits,
+        finished));
     *list.add_campaigns() = status.ok()
                                 ? *std::move(status)
                                 : StatusWithout(record, std::string(status.status().message()));

@@ -89,6 +89,32 @@ TEST_F(Answers, OneUnreadablePosteriorIsSaidOfItsCampaignAndTheOthersAreListed) 
   EXPECT_EQ(list->campaigns(2).problem(), "");
 }
 
+// What has finished is counted once; a batch that is added to a design is counted too.
+TEST_F(Answers, WhatHasFinishedIsKnownUntilItGoesOn) {
+  AddCampaign(1, Posterior(2));
+  FinishedStatuses finished;
+  store::Reader reader = Read();
+  ASSERT_TRUE(StatusOf(reader, 1, std::nullopt, "", &finished).ok());
+  EXPECT_FALSE(finished.Find(*reader.Campaign(1)).has_value()) << "it runs";
+  Write([](store::Transaction& t) {
+    t.SetProgress(1, {.state = store::CampaignState::kFinished, .converged = true});
+  });
+  store::Reader later = Read();
+  const auto first = StatusOf(later, 1, std::nullopt, "", &finished);
+  ASSERT_TRUE(first.ok()) << first.status();
+  ASSERT_TRUE(finished.Find(*later.Campaign(1)).has_value());
+  const auto again = StatusOf(later, 1, std::nullopt, "disk full", &finished);
+  EXPECT_EQ(again->server_waits(), "disk full");
+  EXPECT_EQ(again->best_misfit(), first->best_misfit());
+  const auto list = ListOf(later, {}, "", &finished);
+  EXPECT_EQ(list->campaigns(0).SerializeAsString(), first->SerializeAsString());
+  Write([](store::Transaction& t) {
+    t.SetProgress(1, {.state = store::CampaignState::kFinished, .iteration = 1});
+  });
+  store::Reader last = Read();
+  EXPECT_EQ(StatusOf(last, 1, std::nullopt, "", &finished)->iteration(), 1);
+}
+
 TEST_F(Answers, AReasonOfMegabytesOfAnEarlierProgramIsCut) {
   AddCampaign(1, Posterior(2), "sand\nof two lines");
   Write([](store::Transaction& t) {
