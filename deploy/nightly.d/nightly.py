@@ -53,12 +53,13 @@ def digest_of(root, piece):
 class Stamps:
     """What is known of each piece: digest, result, minutes and date of its last run that came to an end."""
 
-    def __init__(self, folder):
-        self.folder = folder
-        os.makedirs(folder, exist_ok=True)
+    def __init__(self, folder, logs):
+        self.folder, self.logs = folder, logs
+        for made in (folder, logs):
+            os.makedirs(made, exist_ok=True)
 
     def log(self, piece):
-        return os.path.join(self.folder, piece['name'] + '.log')
+        return os.path.join(self.logs, piece['name'] + '.log')
 
     def read(self, piece):
         try:
@@ -70,7 +71,7 @@ class Stamps:
     def write(self, piece, stamp):
         path = os.path.join(self.folder, piece['name'] + '.json')
         with open(path + '.new', 'w', encoding='utf-8') as file:
-            json.dump(stamp, file)
+            file.write(json.dumps(stamp, indent=1) + '\n')
         os.replace(path + '.new', path)  # whole or not at all
 
 
@@ -118,13 +119,14 @@ def main():
     parser = argparse.ArgumentParser(description='pieces of deploy/nightly')
     for option in ('--root', '--pieces', '--stamps', '--results'):
         parser.add_argument(option, required=True, help=argparse.SUPPRESS)
+    parser.add_argument('--logs', help=argparse.SUPPRESS)
     parser.add_argument('--list', action='store_true', help='what there is and how it stands; runs nothing')
     parser.add_argument('names', nargs='*', metavar='PIECE', help='all when none is named')
     arguments = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # through the finally of run()
 
     pieces = pieces_of(arguments.pieces)
-    stamps = Stamps(arguments.stamps)
+    stamps = Stamps(arguments.stamps, arguments.logs or arguments.stamps)
     unknown = set(arguments.names) - {piece['name'] for piece in pieces}
     if unknown:
         parser.error(f'no piece is named {" ".join(sorted(unknown))}; there are: {" ".join(piece["name"] for piece in pieces)}')

@@ -126,6 +126,8 @@ absl::StatusOr<std::string> StepJson(const std::string& folder, int load_step) {
     speed[g] = std::hypot(velocity[3 * g], velocity[3 * g + 1], velocity[3 * g + 2]);
   }
   std::vector<std::size_t> i, j;
+  i.reserve(force.size());
+  j.reserve(force.size());
   for (std::size_t c = 0; c < force.size(); ++c) {
     i.push_back(place[first[c]]);
     j.push_back(place[second[c]]);

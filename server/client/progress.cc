@@ -85,7 +85,7 @@ BusyLine::~BusyLine() {
   drawer_.join();
 }
 
-void BusyLine::Draw(std::string what) {
+void BusyLine::Draw(const std::string& what) {
   constexpr int kSilent = 2;  // s
   std::unique_lock lock(mutex_);
   bool drawn = false;

@@ -49,7 +49,7 @@ class BusyLine {
   BusyLine& operator=(const BusyLine&) = delete;
 
  private:
-  void Draw(std::string what);
+  void Draw(const std::string& what);
 
   std::mutex mutex_;
   std::condition_variable ended_;

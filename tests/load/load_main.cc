@@ -80,6 +80,7 @@ int Run(const Options& o) {
                                .slots = o.slots,
                                .states_per_second = o.rate / (o.workers * o.slots)};
   std::vector<std::unique_ptr<calib::load::LoadWorker>> workers;
+  workers.reserve(static_cast<std::size_t>(o.workers));
   for (int i = 0; i < o.workers; ++i) {
     workers.push_back(
         std::make_unique<calib::load::LoadWorker>(absl::StrCat("load-", i), load));

@@ -38,7 +38,7 @@ class Citations {
 std::string PriorInWords(const campaign::CalibratedParameter& p) {
   const auto shown = [&p](double value) { return NumberWithUnit(value, p.name, p.unit, 4); };
   const inference::Prior& prior = p.prior;
-  const std::string bounds =
+  std::string bounds =
       std::isfinite(prior.min) && std::isfinite(prior.max)
           ? fmt::format("from {} to {}", shown(prior.min), shown(prior.max))
           : "";
