@@ -3,7 +3,7 @@
 import { Answers, askServer } from "./answers.ts";
 import { append, h, replace } from "./dom.ts";
 import type { Status } from "./documents.ts";
-import { drawAll } from "./figures/frame.ts";
+import { drawForPaper, drawForScreen } from "./figures/frame.ts";
 import { Live, type Connection } from "./live.ts";
 import { kViews, linkTo, readRoute, type ViewName } from "./route.ts";
 import { campaignsView } from "./views/campaigns.ts";
@@ -108,7 +108,8 @@ export function showLivePage(): void {
   }
 
   addEventListener("hashchange", show);
-  addEventListener("beforeprint", () => drawAll(document));
+  addEventListener("beforeprint", () => drawForPaper(document));
+  addEventListener("afterprint", () => drawForScreen(document));
   show();
   new Live(answers, sayConnection).start();
 }

@@ -4,7 +4,7 @@
 import { Answers } from "./answers.ts";
 import { append, h } from "./dom.ts";
 import type { Improvement, Shown } from "./documents.ts";
-import { drawAll, drawSoon } from "./figures/frame.ts";
+import { drawForPaper, drawForScreen, drawSoon } from "./figures/frame.ts";
 import { dateText, nameForPeople } from "./units.ts";
 import { errorView } from "./views/error.ts";
 import { fitView } from "./views/fit.ts";
@@ -61,5 +61,6 @@ export function showReport({ campaign, documents }: Embedded): void {
   add(recordView, campaign, "/record");
   // Whoever searches, saves or prints has all of it.
   setTimeout(() => drawSoon(document), kInSightFirst);
-  addEventListener("beforeprint", () => drawAll(document));
+  addEventListener("beforeprint", () => drawForPaper(document));
+  addEventListener("afterprint", () => drawForScreen(document));
 }

@@ -5,9 +5,11 @@ import { h, replace, svg } from "../dom.ts";
 import { numberText } from "../units.ts";
 import { csvText, type Figure, type KeyEntry, type Table } from "./figure.ts";
 
+const kPaperWidth = 700; // px of A4 within its margins
+const kPaperGap = 12;
 const kNear = "400px"; // drawn before it is seen
 const kSeen = new WeakMap<Element, () => void>();
-const kNow = new WeakMap<Element, () => void>();
+const kPaper = new WeakMap<Element, (width: number) => void>();
 const kWhenSeen = new IntersectionObserver(
   (entries) => {
     for (const entry of entries) if (entry.isIntersecting) kSeen.get(entry.target)?.();
@@ -63,9 +65,8 @@ export function frameOf(first: Figure): Frame {
     tableHolder,
   );
 
-  function draw(): void {
+  function draw(width = Math.floor(picture.clientWidth)): void {
     waiting = false;
-    const width = Math.floor(picture.clientWidth);
     if (width === 0 || !element.isConnected) return;
     drawnWidth = width;
     picture.replaceChildren(figure.draw(width));
@@ -74,7 +75,7 @@ export function frameOf(first: Figure): Frame {
   function plan(): void {
     if (waiting || !seen) return;
     waiting = true;
-    soon(draw);
+    soon(() => draw());
   }
   function label(): void {
     title.textContent = figure.title;
@@ -101,9 +102,7 @@ export function frameOf(first: Figure): Frame {
     plan();
   });
   kWhenSeen.observe(element);
-  kNow.set(element, () => {
-    if (drawnWidth === 0) draw();
-  });
+  kPaper.set(element, draw);
   kWidths.set(picture, () => {
     if (Math.floor(picture.clientWidth) !== drawnWidth) plan();
   });
@@ -123,9 +122,16 @@ export function drawSoon(root: ParentNode): void {
   for (const figure of root.querySelectorAll("figure")) kSeen.get(figure)?.();
 }
 
-/// Draws now, in this task, whatever of the page has not come into sight: for paper.
-export function drawAll(root: ParentNode): void {
-  for (const figure of root.querySelectorAll("figure")) kNow.get(figure)?.();
+/// Draws all now, in this task, as wide as they are on paper: alone or two beside each other (page.css).
+export function drawForPaper(root: ParentNode): void {
+  for (const figure of root.querySelectorAll("figure")) {
+    kPaper.get(figure)?.(figure.closest(".single") === null ? kPaperWidth / 2 - kPaperGap : kPaperWidth);
+  }
+}
+
+/// Draws anew what is not as wide as its place.
+export function drawForScreen(root: ParentNode): void {
+  for (const picture of root.querySelectorAll(".picture")) kWidths.get(picture)?.();
 }
 
 export function tableElement(caption: string, table: Table): HTMLTableElement {
