@@ -70,6 +70,10 @@ class VtkArrays {
   std::map<std::string, std::string> bytes_;
 };
 
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
 template <class Values>
 std::string Listed(const Values& values) {
   return absl::StrCat("[", absl::StrJoin(values, ","), "]");  // numbers in six digits
@@ -119,6 +123,11 @@ absl::StatusOr<std::string> StepJson(const std::string& folder, int load_step) {
       second.size() != force.size()) {
     return absl::InvalidArgumentError(folder + " holds grains whose arrays do not fit");
   }
+  if (!AllFinite(points) || !AllFinite(radius) || !AllFinite(velocity) || !AllFinite(length) ||
+      !AllFinite(force)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(folder, " holds a number that is none at load step ", load_step));
+  }
   std::map<std::int32_t, std::size_t> place;
   std::vector<double> speed(n);
   for (std::size_t g = 0; g < n; ++g) {
@@ -129,8 +138,13 @@ absl::StatusOr<std::string> StepJson(const std::string& folder, int load_step) {
   i.reserve(force.size());
   j.reserve(force.size());
   for (std::size_t c = 0; c < force.size(); ++c) {
-    i.push_back(place[first[c]]);
-    j.push_back(place[second[c]]);
+    const auto from = place.find(first[c]);
+    const auto to = place.find(second[c]);
+    if (from == place.end() || to == place.end()) {
+      return absl::InvalidArgumentError(folder + " holds contacts of grains that it does not hold");
+    }
+    i.push_back(from->second);
+    j.push_back(to->second);
   }
   const bool is_closed = std::ifstream(file("cell", "vtp")).good();
   return absl::StrCat(
@@ -148,8 +162,8 @@ std::vector<int> Chosen(const std::vector<int>& load_steps) {
   const int most = std::min(all, kMostKeptSteps);
   std::vector<int> chosen;
   for (int k = 0; k < most; ++k) {
-    chosen.push_back(load_steps[static_cast<std::size_t>(
-        most == 1 ? all - 1 : k * (all - 1) / (most - 1))]);
+    chosen.push_back(
+        load_steps[static_cast<std::size_t>(most == 1 ? all - 1 : k * (all - 1) / (most - 1))]);
   }
   return chosen;
 }
@@ -165,44 +179,53 @@ absl::StatusOr<std::vector<int>> KeepGrains(Client& client, const GrainsOf& run,
     ASSIGN_OR_RETURN(const std::string json, StepJson(folder, step));
     absl::StrAppend(&steps, steps.empty() ? "" : ",\n", json);
   }
-  const std::string document =
-      absl::StrCat("{\"sample\": ", run.sample,
-                   ", \"experiment\": ", nlohmann::json(run.experiment).dump(), ", \"steps\": [\n",
-                   steps, "]}\n");
+  const std::string document = absl::StrCat(
+      "{\"sample\": ", run.sample, ", \"experiment\": ", nlohmann::json(run.experiment).dump(),
+      ", \"steps\": [\n", steps, "]}\n");
   RETURN_IF_ERROR(client.AddFinding(run.campaign, kGrains, document));
   return kept;
 }
 
+std::string PackingIn(const std::string& text, const GrainsOf& run, std::optional<int> load_step) {
+  using Json = nlohmann::ordered_json;
+  const Json json = Json::parse(text, nullptr, false);
+  const auto field = [](const Json& of, const char* name) {
+    return of.is_object() && of.contains(name) ? of[name] : Json();
+  };
+  const Json experiment = field(json, "experiment");
+  const Json steps = field(json, "steps");
+  if (field(json, "sample") != Json(run.sample) || !experiment.is_string() || !steps.is_array() ||
+      (!run.experiment.empty() && experiment != Json(run.experiment))) {
+    return "";
+  }
+  Json load_steps = Json::array();
+  Json shown;
+  for (const Json& step : steps) {
+    const Json number = field(step, "load_step");
+    if (!number.is_number_integer()) continue;
+    load_steps.push_back(number);
+    if (!load_step || number == Json(*load_step)) shown = step;
+  }
+  if (shown.is_null()) return "";
+  Json document = {{"campaign", run.campaign},
+                   {"sample", run.sample},
+                   {"experiment", experiment},
+                   {"load_steps", load_steps}};
+  document.update(shown);
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 absl::StatusOr<std::string> GrainsDocument(Client& client, const GrainsOf& run,
                                            std::optional<int> load_step) {
-  const absl::Status none = absl::NotFoundError(
-      absl::StrCat("no packing of sample ", run.sample, " of ", run.campaign, " was kept"));
   ASSIGN_OR_RETURN(const auto findings, client.Findings(run.campaign));
   for (auto finding = findings.rbegin(); finding != findings.rend(); ++finding) {
     if (finding->kind() != kGrains) continue;
     ASSIGN_OR_RETURN(const std::string text, client.GetBlob(finding->digest()));
-    auto json = nlohmann::ordered_json::parse(text, nullptr, false);
-    if (!json.is_object() || !json.contains("steps") || !json["steps"].is_array() ||
-        json.value("sample", -1) != run.sample ||
-        (!run.experiment.empty() && json.value("experiment", "") != run.experiment)) {
-      continue;
-    }
-    nlohmann::ordered_json* shown = nullptr;
-    nlohmann::ordered_json load_steps = nlohmann::ordered_json::array();
-    for (auto& step : json["steps"]) {
-      const int number = step.value("load_step", -1);
-      load_steps.push_back(number);
-      if (number == load_step.value_or(number)) shown = &step;
-    }
-    if (shown == nullptr) continue;
-    nlohmann::ordered_json document = {{"campaign", run.campaign},
-                                       {"sample", run.sample},
-                                       {"experiment", json["experiment"]},
-                                       {"load_steps", load_steps}};
-    document.update(*shown);
-    return document.dump() + "\n";
+    std::string document = PackingIn(text, run, load_step);
+    if (!document.empty()) return document;
   }
-  return none;
+  return absl::FailedPreconditionError(
+      absl::StrCat("no packing of sample ", run.sample, " of ", run.campaign, " was kept"));
 }
 
 }  // namespace calib::client

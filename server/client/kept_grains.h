@@ -12,8 +12,8 @@
 namespace calib::client {
 
 inline constexpr const char* kGrains = "grains";  ///< kind of finding: load steps of one run
-/// Load steps of a run that are kept at most, the first and the last and some between. Chosen: those
-/// of ten thousand grains stay below 16 MB.
+/// Load steps of a run that are kept at most, the first and the last and some between. Chosen:
+/// those of ten thousand grains stay below 16 MB.
 inline constexpr int kMostKeptSteps = 8;
 
 /// A run whose packings are kept.
@@ -24,9 +24,9 @@ struct GrainsOf {
 };
 
 /// Reads grains and contacts as calib-worker has written them (dem/simulate/vtk_series.h) and keeps
-/// them at the server; six significant digits. folder: of the run. load_steps: ascending, those that
-/// are there. Returns the load steps that are kept. Errors: INVALID_ARGUMENT: a file that is no such
-/// file; those of Client.
+/// them at the server; six significant digits. folder: of the run. load_steps: ascending, those
+/// that are there. Returns the load steps that are kept. Errors: INVALID_ARGUMENT: a file that is
+/// no such file, or holds a number that is none; those of Client.
 absl::StatusOr<std::vector<int>> KeepGrains(Client& client, const GrainsOf& run,
                                             const std::string& folder,
                                             const std::vector<int>& load_steps);
@@ -34,8 +34,13 @@ absl::StatusOr<std::vector<int>> KeepGrains(Client& client, const GrainsOf& run,
 /// JSON of a packing that is kept: `campaign, sample, experiment, load_step, load_steps` (all that
 /// are kept of this run), `cell` (`min, max` [m]), `grains` (arrays `x, y, z, radius` [m], `speed`
 /// [m/s], `coordination`), `contacts` (arrays `i, j` of places in grains, `normal_force` [N]).
-/// experiment: empty: the first that is kept; load_step: none: the last. NOT_FOUND: none is kept.
+/// experiment: empty: that which was kept last; load_step: none: the last. Errors: those of Client;
+/// FAILED_PRECONDITION: none is kept.
 absl::StatusOr<std::string> GrainsDocument(Client& client, const GrainsOf& run,
                                            std::optional<int> load_step);
+
+/// The same from a text that somebody has kept, whatever it is; empty: it has no such packing.
+/// Pure.
+std::string PackingIn(const std::string& text, const GrainsOf& run, std::optional<int> load_step);
 
 }  // namespace calib::client

@@ -52,8 +52,8 @@ absl::StatusOr<report::DocumentsByPath> ReportDocuments(Client& client,
   documents[here + "/record"] = report::RecordJson(view);
   RETURN_IF_ERROR(Add(documents, here + "/lineage", LineageDocument(client, campaign)));
   RETURN_IF_ERROR(Add(documents, here + "/compare", CompareDocument(client, campaign, &shelf)));
-  RETURN_IF_ERROR(Add(documents, here + "/diagnosis",
-                      FindingDocument(client, campaign, kDiagnosis)));
+  RETURN_IF_ERROR(
+      Add(documents, here + "/diagnosis", FindingDocument(client, campaign, kDiagnosis)));
   auto improvement = FindingDocument(client, campaign, kImprovement);
   RETURN_IF_ERROR(Add(documents, here + "/improvement", improvement));
   if (view.posterior.parameters_size() > 0) {

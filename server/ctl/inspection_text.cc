@@ -66,10 +66,10 @@ std::string Counted(std::size_t count, const char* what) {
 
 std::string InspectionText(const Inspection& inspection, const report::TerminalStyle& style) {
   const inspection::InspectedTable& table = inspection.table;
-  std::string text = absl::StrCat(inspection.file, ": ", Counted(inspection.rows, "row"), ", cells parted by ",
-                                  inspection::DelimiterWord(table.parting), ", decimal ",
-                                  inspection::DecimalWord(table.mark), ", ", table.encoding, ", ",
-                                  Counted(table.header_lines, "line"), " above the rows\n");
+  std::string text = absl::StrCat(
+      inspection.file, ": ", Counted(inspection.rows, "row"), ", cells parted by ",
+      inspection::DelimiterWord(table.parting), ", decimal ", inspection::DecimalWord(table.mark),
+      ", ", table.encoding, ", ", Counted(table.header_lines, "line"), " above the rows\n");
   if (inspection.tests.size() > 1) {
     std::vector<std::string> names;
     constexpr std::size_t kShown = 8;

@@ -39,11 +39,10 @@ absl::StatusOr<std::string> Find(client::Client& client, client::CampaignShelf& 
     case Document::kStates:
       return client::StatesDocument(client, campaign, *question.number);
     case Document::kGrains:
-      return client::GrainsDocument(client,
-                                    {.campaign = campaign,
-                                     .sample = *question.number,
-                                     .experiment = question.experiment},
-                                    question.load_step);
+      return client::GrainsDocument(
+          client,
+          {.campaign = campaign, .sample = *question.number, .experiment = question.experiment},
+          question.load_step);
     case Document::kWorkers:
       return client::WorkersDocument(client);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// The files of the page as they were compiled in (page/ at the root of the tree).
+// The files of the page as they were compiled in (web/).
 
 #include <span>
 #include <string_view>

@@ -200,7 +200,7 @@ void Page::Impl::Ask(const HttpRequest& request, const Target& target,
                  if (kept.ok()) {
                    finish(Send(request, *kept, kJson, "no-store"));
                  } else if (question.document == Document::kGrains &&
-                            absl::IsNotFound(kept.status())) {
+                            absl::IsFailedPrecondition(kept.status())) {
                    finish(Refusal(404, std::string(kept.status().message()),
                                   absl::StrCat("calibctl vtk ", question.campaign, " ",
                                                *question.number, " --keep -o grains")));

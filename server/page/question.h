@@ -25,11 +25,11 @@ enum class Document {
 
 struct Question {
   Document document = Document::kList;
-  std::string campaign{};       ///< lower-case letters and digits; empty: of all campaigns
-  std::optional<int> number{};  ///< sample of kStates and kGrains; iteration of kPosterior
-  std::optional<int> limit{};   ///< of kList
-  std::string after{};          ///< of kList
-  std::string experiment{};     ///< of kGrains; empty: any
+  std::string campaign{};          ///< lower-case letters and digits; empty: of all campaigns
+  std::optional<int> number{};     ///< sample of kStates and kGrains; iteration of kPosterior
+  std::optional<int> limit{};      ///< of kList
+  std::string after{};             ///< of kList
+  std::string experiment{};        ///< of kGrains; empty: any
   std::optional<int> load_step{};  ///< of kGrains; none: the last
 
   /// The same for equal questions and for no others.

@@ -179,8 +179,7 @@ std::optional<v1::CampaignStatus> FinishedStatuses::Find(
   return found->second.status;
 }
 
-void FinishedStatuses::Keep(const store::CampaignRecord& record,
-                            const v1::CampaignStatus& status) {
+void FinishedStatuses::Keep(const store::CampaignRecord& record, const v1::CampaignStatus& status) {
   if (record.progress.state != CampaignState::kFinished) return;
   const absl::MutexLock lock(&mutex_);
   kept_[record.submitted.id] = {.iteration = record.progress.iteration, .status = status};
@@ -254,9 +253,9 @@ absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
   for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;
     const auto known = live.find(id);
-    auto status = Outgoing(StatusOf(
-        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second), waits,
-        finished));
+    auto status = Outgoing(
+        StatusOf(reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second),
+                 waits, finished));
     *list.add_campaigns() = status.ok()
                                 ? *std::move(status)
                                 : StatusWithout(record, std::string(status.status().message()));

@@ -39,8 +39,8 @@ class FinishedStatuses {
 };
 
 /// live: what the scheduler knows beyond the store; empty: nothing, the campaign is over. waits:
-/// what the server waits for; empty: nothing. finished: what is known already. A stored posterior that cannot be read is said in
-/// `problem`.
+/// what the server waits for; empty: nothing. finished: what is known already. A stored posterior
+/// that cannot be read is said in `problem`.
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live,
                                             const std::string& waits = "",

@@ -1,5 +1,5 @@
-// load --server HOST:PORT ...: workers without mechanics at a running calibd, in one process; prints
-// one JSON object. See README.md.
+// load --server HOST:PORT ...: workers without mechanics at a running calibd, in one process;
+// prints one JSON object. See README.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -21,11 +21,11 @@ using calib::load::Clock;
 struct Options {
   std::string server, token;
   int workers = 10, slots = 1;
-  double rate = 100;     // states per second, of all
-  double warm_up = 5;    // s
-  double seconds = 20;   // s, that count
-  int states = 100;      // of a run
-  int samples = 0;       // of the campaign; 0: as many as the time takes
+  double rate = 100;    // states per second, of all
+  double warm_up = 5;   // s
+  double seconds = 20;  // s, that count
+  int states = 100;     // of a run
+  int samples = 0;      // of the campaign; 0: as many as the time takes
 };
 
 // Spheres that hit a wall at many angles: a state each.
@@ -82,8 +82,7 @@ int Run(const Options& o) {
   std::vector<std::unique_ptr<calib::load::LoadWorker>> workers;
   workers.reserve(static_cast<std::size_t>(o.workers));
   for (int i = 0; i < o.workers; ++i) {
-    workers.push_back(
-        std::make_unique<calib::load::LoadWorker>(absl::StrCat("load-", i), load));
+    workers.push_back(std::make_unique<calib::load::LoadWorker>(absl::StrCat("load-", i), load));
   }
   const auto begun = Clock::now();
   const auto counted = begun + std::chrono::duration<double>(o.warm_up);

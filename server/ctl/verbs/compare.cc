@@ -52,7 +52,8 @@ absl::StatusOr<int> Compare(const CommonOptions& common, const CompareOptions& o
   }
   const report::Comparison& comparison = compared.comparison;
   if (!compared.is_known) return absl::FailedPreconditionError(comparison.note);
-  std::cout << ComparisonText(comparison) + report::FitPlots(compared.curves, kPlots, ThisTerminal()) +
+  std::cout << ComparisonText(comparison) +
+                   report::FitPlots(compared.curves, kPlots, ThisTerminal()) +
                    Next(common, options, comparison);
   return kDone;
 }

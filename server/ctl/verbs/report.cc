@@ -42,10 +42,11 @@ absl::StatusOr<int> Report(const CommonOptions& common, const ReportOptions& opt
 }  // namespace
 
 Verb ReportVerb() {
-  return MakeVerb<ReportOptions>({.name = "report",
-                                  .description = "One self-contained HTML file with the figures of the live page",
-                                  .example = "report c1 -o c1.html --state calib-state"},
-                                 &Declare, &Report);
+  return MakeVerb<ReportOptions>(
+      {.name = "report",
+       .description = "One self-contained HTML file with the figures of the live page",
+       .example = "report c1 -o c1.html --state calib-state"},
+      &Declare, &Report);
 }
 
 }  // namespace calib::ctl

@@ -200,11 +200,11 @@ absl::StatusOr<int> Vtk(const CommonOptions& common, const VtkOptions& options) 
     const std::string path = (std::filesystem::path(options.output) / name).string();
     std::vector<int> kept;
     if (options.keep && drawn.is_same && !drawn.load_steps.empty()) {
-      ASSIGN_OR_RETURN(kept, client::KeepGrains(client,
-                                                {.campaign = options.campaign,
-                                                 .sample = options.sample,
-                                                 .experiment = name},
-                                                path, drawn.load_steps));
+      ASSIGN_OR_RETURN(
+          kept,
+          client::KeepGrains(
+              client, {.campaign = options.campaign, .sample = options.sample, .experiment = name},
+              path, drawn.load_steps));
     }
     written.push_back({{"experiment", name}, {"folder", path}, {"load_steps", drawn.load_steps}});
     if (options.keep) written.back()["kept"] = kept;

@@ -57,7 +57,7 @@ absl::StatusOr<int> Watch(const CommonOptions& common, const WatchOptions& optio
     if (good && !messages::RunsRowsOnly(*last)) {
       ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
       std::cout << report::FitPlots(report::Curves(view, report::PredictReadings(view)), kPlots,
-                            ThisTerminal());
+                                    ThisTerminal());
     }
   }
   return good ? kDone : kFailed;

@@ -10,7 +10,6 @@
 namespace calib::report {
 namespace {
 
-
 constexpr int kRows = 9;          // of a plot's area: two plots and their axes fit 25 lines
 constexpr int kResidualRows = 6;  // residuals are read for their sign and run
 
@@ -89,14 +88,13 @@ std::string FitPlot(const Drawn& drawn, const TerminalStyle& style) {
   }
   curves.push_back(
       {.name = "measured", .x = x.values, .y = Scaled(o.values, unit.factor), .joined = false});
-  const std::string plot = TerminalPlot(
-      curves, {.x = x.label, .y = Label(o.name, unit), .rows = kRows}, style);
+  const std::string plot =
+      TerminalPlot(curves, {.x = x.label, .y = Label(o.name, unit), .rows = kRows}, style);
   if (plot.empty()) return "";
   const std::string error =
       std::isfinite(drawn.error) ? fmt::format(": {} sd", Number(drawn.error, 3)) : "";
   return fmt::format("{}{}, {}{}\n", drawn.experiment->experiment,
-                     drawn.experiment->heldout ? " (held out)" : "",
-                     NameForPeople(o.name), error) +
+                     drawn.experiment->heldout ? " (held out)" : "", NameForPeople(o.name), error) +
          plot;
 }
 
@@ -107,15 +105,12 @@ std::string ResidualPlot(const ExperimentCurves& e, const TerminalStyle& style) 
     if (!std::isfinite(RmsOf(o.residual))) continue;
     Abscissa x = AbscissaOf(e, o.residual.size());
     label = x.label;
-    curves.push_back({.name = NameForPeople(o.name),
-                      .x = std::move(x.values),
-                      .y = o.residual,
-                      .joined = true});
+    curves.push_back(
+        {.name = NameForPeople(o.name), .x = std::move(x.values), .y = o.residual, .joined = true});
   }
   if (curves.empty()) return "";
   return fmt::format("{}: model minus measurement [sd]\n", e.experiment) +
-         TerminalPlot(curves, {.x = label, .y = "residual [sd]", .rows = kResidualRows},
-                              style);
+         TerminalPlot(curves, {.x = label, .y = "residual [sd]", .rows = kResidualRows}, style);
 }
 
 }  // namespace

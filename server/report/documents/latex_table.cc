@@ -11,10 +11,16 @@ namespace {
 
 // Text as LaTeX sets it, whatever is in it.
 std::string Tex(const std::string& text) {
-  static const std::map<char, const char*> special = {
-      {'\\', "\\textbackslash{}"}, {'{', "\\{"},  {'}', "\\}"}, {'$', "\\$"},
-      {'&', "\\&"},                {'#', "\\#"},  {'_', "\\_"}, {'%', "\\%"},
-      {'~', "\\textasciitilde{}"}, {'^', "\\textasciicircum{}"}};
+  static const std::map<char, const char*> special = {{'\\', "\\textbackslash{}"},
+                                                      {'{', "\\{"},
+                                                      {'}', "\\}"},
+                                                      {'$', "\\$"},
+                                                      {'&', "\\&"},
+                                                      {'#', "\\#"},
+                                                      {'_', "\\_"},
+                                                      {'%', "\\%"},
+                                                      {'~', "\\textasciitilde{}"},
+                                                      {'^', "\\textasciicircum{}"}};
   std::string tex;
   for (const char c : text) {
     const auto found = special.find(c);

@@ -38,10 +38,9 @@ class Citations {
 std::string PriorInWords(const campaign::CalibratedParameter& p) {
   const auto shown = [&p](double value) { return NumberWithUnit(value, p.name, p.unit, 4); };
   const inference::Prior& prior = p.prior;
-  std::string bounds =
-      std::isfinite(prior.min) && std::isfinite(prior.max)
-          ? fmt::format("from {} to {}", shown(prior.min), shown(prior.max))
-          : "";
+  std::string bounds = std::isfinite(prior.min) && std::isfinite(prior.max)
+                           ? fmt::format("from {} to {}", shown(prior.min), shown(prior.max))
+                           : "";
   const std::string inside = bounds.empty() ? "" : ", " + bounds;
   switch (prior.kind) {
     case inference::PriorKind::kUniform:
@@ -63,8 +62,9 @@ std::string ModelSentence(const campaign::Campaign& campaign, Citations& cited) 
                        campaign.precomputed->parameters.rows());
   }
   std::string text = "Simulated by the discrete element method" +
-                     cited.Cite("Cundall PA, Strack ODL (1979) A discrete numerical model for "
-                                "granular assemblies. Géotechnique 29:47–65") +
+                     cited.Cite(
+                         "Cundall PA, Strack ODL (1979) A discrete numerical model for "
+                         "granular assemblies. Géotechnique 29:47–65") +
                      " with the contact law " + NameForPeople(campaign.model.contact);
   const dem::ContactInfo* contact = dem::FindContact(campaign.model.contact);
   if (contact != nullptr && !contact->reference.empty()) text += cited.Cite(contact->reference);
@@ -112,41 +112,46 @@ std::string ErrorSentence(const campaign::Campaign& campaign) {
 
 std::string MethodSentence(const CampaignView& view, Citations& cited) {
   const campaign::Campaign& campaign = view.campaign;
-  const std::string runs =
-      fmt::format("{} model evaluations, seed {}", view.posterior.model_evaluations(),
-                  campaign.seed);
+  const std::string runs = fmt::format("{} model evaluations, seed {}",
+                                       view.posterior.model_evaluations(), campaign.seed);
   switch (campaign.method) {
     case campaign::Method::kSqmc:
       return "Sequential quasi-Monte Carlo filter" +
-             cited.Cite("Cheng H, Shuku T, Thoeni K, Yamamoto H (2018) Probabilistic calibration "
-                        "of discrete element simulations using the sequential quasi-Monte Carlo "
-                        "filter. Granular Matter 20:11") +
+             cited.Cite(
+                 "Cheng H, Shuku T, Thoeni K, Yamamoto H (2018) Probabilistic calibration "
+                 "of discrete element simulations using the sequential quasi-Monte Carlo "
+                 "filter. Granular Matter 20:11") +
              fmt::format(", {} samples; {}.", campaign.samples, runs);
     case campaign::Method::kIterativeBayesianFilter:
       return "Iterative Bayesian filter" +
-             cited.Cite("Cheng H, Shuku T, Thoeni K, Tempone P, Luding S, Magnanimo V (2019) An "
-                        "iterative Bayesian filtering framework for fast and automated "
-                        "calibration of DEM models. Comput Methods Appl Mech Eng 350:268–294") +
+             cited.Cite(
+                 "Cheng H, Shuku T, Thoeni K, Tempone P, Luding S, Magnanimo V (2019) An "
+                 "iterative Bayesian filtering framework for fast and automated "
+                 "calibration of DEM models. Comput Methods Appl Mech Eng 350:268–294") +
              fmt::format(", {} iterations of {} samples; {}.", view.posterior.iterations(),
                          campaign.samples, runs);
     case campaign::Method::kTmcmc:
       return "Transitional Markov chain Monte Carlo" +
-             cited.Cite("Ching J, Chen YC (2007) Transitional Markov chain Monte Carlo method for "
-                        "Bayesian model updating, model class selection, and model averaging. "
-                        "J Eng Mech 133:816–832") +
-             cited.Cite("Hadjidoukas PE, Angelikopoulos P, Rossinelli D, Alexeev D, Papadimitriou "
-                        "C, Koumoutsakos P (2014) Bayesian uncertainty quantification and "
-                        "propagation for discrete element simulations of granular materials. "
-                        "Comput Methods Appl Mech Eng 282:218–238") +
+             cited.Cite(
+                 "Ching J, Chen YC (2007) Transitional Markov chain Monte Carlo method for "
+                 "Bayesian model updating, model class selection, and model averaging. "
+                 "J Eng Mech 133:816–832") +
+             cited.Cite(
+                 "Hadjidoukas PE, Angelikopoulos P, Rossinelli D, Alexeev D, Papadimitriou "
+                 "C, Koumoutsakos P (2014) Bayesian uncertainty quantification and "
+                 "propagation for discrete element simulations of granular materials. "
+                 "Comput Methods Appl Mech Eng 282:218–238") +
              fmt::format(", {} chains; {}.", campaign.samples, runs);
     case campaign::Method::kSurrogateMsrs:
       return "Minimum sought by a metric stochastic response surface" +
-             cited.Cite("Regis RG, Shoemaker CA (2007) A stochastic radial basis function method "
-                        "for the global optimization of expensive functions. INFORMS J Comput "
-                        "19:497–509") +
-             cited.Cite("Samuelsson A (2023) Parallel optimization for model calibration of large "
-                        "scale particle systems. Master's thesis, Chalmers University of "
-                        "Technology, Gothenburg") +
+             cited.Cite(
+                 "Regis RG, Shoemaker CA (2007) A stochastic radial basis function method "
+                 "for the global optimization of expensive functions. INFORMS J Comput "
+                 "19:497–509") +
+             cited.Cite(
+                 "Samuelsson A (2023) Parallel optimization for model calibration of large "
+                 "scale particle systems. Master's thesis, Chalmers University of "
+                 "Technology, Gothenburg") +
              fmt::format("; {}.", runs);
     case campaign::Method::kTable:
     case campaign::Method::kDesign:

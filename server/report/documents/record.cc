@@ -73,9 +73,8 @@ Json Entries(const CampaignView& view) {
     add("model", "runs made elsewhere");
   } else {
     add("contact law", NameForPeople(campaign.model.contact));
-    add("shear at unloading",
-        NameForPeople(
-            campaign::WordOf(campaign::kShearUnloadingWords, campaign.model.shear_unloading)));
+    add("shear at unloading", NameForPeople(campaign::WordOf(campaign::kShearUnloadingWords,
+                                                             campaign.model.shear_unloading)));
     add("effects", NamesOf(campaign.model.effects));
     add("engine", dem::EngineVersion());
   }
@@ -86,8 +85,8 @@ Json Entries(const CampaignView& view) {
                                campaign.max_iterations));
     add("stopped early", StoppingInWords(view.posterior));
   }
-  add("effort", fmt::format("{} model evaluations, {} core hours",
-                            view.status.model_evaluations(), Number(view.status.core_hours(), 3)));
+  add("effort", fmt::format("{} model evaluations, {} core hours", view.status.model_evaluations(),
+                            Number(view.status.core_hours(), 3)));
   for (const campaign::Experiment& experiment : campaign.experiments) {
     add("experiment " + experiment.name,
         fmt::format("{}; {} readings; {}; {}",

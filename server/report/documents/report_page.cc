@@ -13,8 +13,8 @@ std::string Escaped(const std::string& text) {
   return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}});
 }
 
-// What stands in a script element ends at the first "</", so that no "<" may stand in it. In JSON it
-// occurs in strings alone.
+// What stands in a script element ends at the first "</", so that no "<" may stand in it. In JSON
+// it occurs in strings alone.
 std::string Embedded(const std::string& json) {
   return absl::StrReplaceAll(json, {{"<", "\\u003c"}});
 }

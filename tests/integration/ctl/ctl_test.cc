@@ -149,9 +149,8 @@ TEST_F(Calibctl, ACalibrationFromEndToEnd) {
   EXPECT_EQ(Call("report " + id + " --state s -o r.html").code, 0);
   EXPECT_THAT(ReadAll(work_ / "r.html"), HasSubstr("campaigns/" + id + "/posterior"));
   EXPECT_EQ(Call("export " + id + " --state s -o all").code, 0);
-  for (const char* name :
-       {"samples.csv", "states.csv", "posterior.json", "fit.csv", "data.json", "record.json",
-        "posterior.tex", "report.html"}) {
+  for (const char* name : {"samples.csv", "states.csv", "posterior.json", "fit.csv", "data.json",
+                           "record.json", "posterior.tex", "report.html"}) {
     EXPECT_GT(ReadAll(work_ / "all" / name).size(), 50U) << name;
   }
   const Answer unknown = Call("show nosuch --state s");

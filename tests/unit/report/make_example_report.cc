@@ -59,9 +59,8 @@ int main(int argc, char** argv) {
   const std::string_view script = Bundled("page.js");
   const std::string hash = absl::HexStringToBytes(calib::rpc::Sha256Hex(script));
   std::ofstream file(argv[1]);
-  file << report::ReportPage(view.status.campaign(), name, Documents(view),
-                             {.style = Bundled("page.css"),
-                              .script = script,
-                              .script_hash = absl::Base64Escape(hash)});
+  file << report::ReportPage(
+      view.status.campaign(), name, Documents(view),
+      {.style = Bundled("page.css"), .script = script, .script_hash = absl::Base64Escape(hash)});
   return file.good() ? 0 : 1;
 }

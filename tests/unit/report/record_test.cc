@@ -24,8 +24,8 @@ TEST(Methods, SayWhatWasFittedToWhatAndHow) {
   const Methods methods = MethodsOf(view);
   for (const char* said :
        {"discrete element method [1]", "young modulus (log-uniform from 400 MPa to 8 GPa)",
-        "tx02 (triaxial drained)", "held out of every fit and choice: ",
-        "240 model evaluations, seed"}) {
+        "tx02 (triaxial drained)",
+        "held out of every fit and choice: ", "240 model evaluations, seed"}) {
     EXPECT_THAT(methods.sentences, Contains(HasSubstr(said)));
   }
   ASSERT_FALSE(methods.references.empty());

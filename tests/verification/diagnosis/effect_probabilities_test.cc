@@ -299,8 +299,7 @@ void WholeChain(int designs, int nulls, int with) {
   EXPECT_GE(all.named, 0.3 * designs * with);
   EXPECT_GE(all.covered, 0.95 * n - 3 * std::sqrt(0.0475 * n));
   if (designs < 2) return;
-  const double error =
-      std::sqrt((excess - excess.mean()).square().sum() / (designs - 1) / designs);
+  const double error = std::sqrt((excess - excess.mean()).square().sum() / (designs - 1) / designs);
   std::cout << "nulls over those stated: " << excess.mean() << " +- " << error << " of all\n";
   EXPECT_LE(std::abs(excess.mean()), 3 * error);
 }
