@@ -1,5 +1,6 @@
 #include "server/client/report_documents.h"
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -32,12 +33,18 @@ absl::StatusOr<std::string> SensitivityOf(const report::CampaignView& view) {
   return report::SensitivityJson(view.status.campaign(), sensitivity);
 }
 
-// The campaign that an improvement ended in; empty: the document is none.
-std::string EndOf(const std::string& improvement) {
+// The campaigns that an improvement began with and ended in; empty ones: the document is none.
+std::array<std::string, 2> EndsOf(const std::string& improvement) {
   const auto json = nlohmann::json::parse(improvement, nullptr, false);
-  if (!json.is_object() || !json.contains("final_campaign")) return "";
-  const auto& end = json["final_campaign"];
-  return end.is_string() ? end.get<std::string>() : "";
+  const auto name = [](const nlohmann::json& step) {
+    const bool has = step.is_object() && step.contains("campaign") && step["campaign"].is_string();
+    return has ? step["campaign"].get<std::string>() : std::string();
+  };
+  if (!json.is_object() || !json.contains("steps") || !json["steps"].is_array() ||
+      json["steps"].empty()) {
+    return {};
+  }
+  return {name(json["steps"].front()), name(json["steps"].back())};
 }
 
 }  // namespace
@@ -62,11 +69,12 @@ absl::StatusOr<report::DocumentsByPath> ReportDocuments(Client& client,
     RETURN_IF_ERROR(Add(documents, here + "/sensitivity", SensitivityOf(view)));
   }
   if (!improvement.ok()) return documents;
-  const std::string last = EndOf(*improvement);
-  if (last.empty() || last == campaign) return documents;
-  const std::string there = "campaigns/" + last;
-  RETURN_IF_ERROR(Add(documents, there, ShowDocument(client, last)));
-  RETURN_IF_ERROR(Add(documents, there + "/compare", CompareDocument(client, last)));
+  for (const std::string& end : EndsOf(*improvement)) {
+    const std::string there = "campaigns/" + end;
+    if (end.empty() || documents.contains(there)) continue;
+    RETURN_IF_ERROR(Add(documents, there, ShowDocument(client, end)));
+    RETURN_IF_ERROR(Add(documents, there + "/compare", CompareDocument(client, end)));
+  }
   return documents;
 }
 

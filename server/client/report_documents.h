@@ -10,8 +10,9 @@
 namespace calib::client {
 
 /// All that is there of the campaign: itself, compare, posterior, sensitivity, diagnosis,
-/// improvement, lineage, record; and of the model that its last improvement ended in, what it is
-/// and how it fits. Errors: those of Client; NOT_FOUND: there is no such campaign.
+/// improvement, lineage, record; and of the models that its last improvement began with and ended
+/// in, what they are and how they fit. Errors: those of Client; NOT_FOUND: there is no such
+/// campaign.
 absl::StatusOr<report::DocumentsByPath> ReportDocuments(Client& client,
                                                         const std::string& campaign);
 

@@ -33,7 +33,7 @@ export function showReport({ campaign, documents }: Embedded): void {
   });
   const shown = documents[`campaigns/${campaign}`] as Shown | undefined;
   const improvement = documents[`campaigns/${campaign}/improvement`] as Improvement | undefined;
-  const last = improvement?.steps.at(-1);
+  const [first, last] = [improvement?.steps[0], improvement?.steps.at(-1)];
   const main = h("main", { class: "report" });
   const name = shown?.name || campaign;
   append(main, [
@@ -49,9 +49,12 @@ export function showReport({ campaign, documents }: Embedded): void {
     append(main, [title === null ? null : h("h2", { class: "part" }, title), root]);
     view(root, { answers, campaign: of, options: new URLSearchParams(), inReport: true, choose: () => {} });
   };
-  const improved = last !== undefined && last.campaign !== campaign && documents[`campaigns/${last.campaign}/compare`] !== undefined;
-  add(fitView, campaign, "/compare", improved ? "Before" : null);
-  if (improved) add(fitView, last.campaign, "/compare", `After: with ${last.effects.map(nameForPeople).join(", ")}`);
+  if (first === undefined || last === undefined || first.campaign === last.campaign) {
+    add(fitView, campaign, "/compare");
+  } else {
+    add(fitView, first.campaign, "/compare", "Before");
+    add(fitView, last.campaign, "/compare", `After: with ${last.effects.map(nameForPeople).join(", ")}`);
+  }
   add(errorView, campaign, "/improvement");
   add(missingView, campaign, "/diagnosis");
   add(misfitView, campaign, "/compare");
