@@ -50,13 +50,17 @@ bool IsGiven(const Iteration& iteration, Eigen::Index i) {
   return iteration.log_proposal && (*iteration.log_proposal)[i] == kInfinity;
 }
 
+bool IsAside(const Iteration& iteration, Eigen::Index i) {
+  return !iteration.aside.empty() && iteration.aside[static_cast<std::size_t>(i)] != 0;
+}
+
 Eigen::Index CountStrangers(const Ensemble& ensemble) {
   Eigen::Index strangers = 0;
   Eigen::Index row = 0;
   for (const Iteration& iteration : ensemble.used) {
     for (Eigen::Index i = 0; i < iteration.parameters.rows(); ++i, ++row) {
       const bool outside = !iteration.log_proposal && ensemble.log_start[row] == -kInfinity;
-      strangers += outside || IsGiven(iteration, i) ? 1 : 0;
+      strangers += outside || IsGiven(iteration, i) || IsAside(iteration, i) ? 1 : 0;
     }
   }
   return strangers;
@@ -68,7 +72,11 @@ void MarkDiverged(Ensemble& ensemble) {
   Eigen::Index row = 0;
   for (const Iteration& iteration : ensemble.used) {
     for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i, ++row) {
-      if (ensemble.log_likelihood[row] == -kInfinity && !iteration.predictions.row(i).allFinite()) {
+      if (IsAside(iteration, i)) {
+        ensemble.log_start[row] = -kInfinity;
+        ++ensemble.aside;
+      } else if (ensemble.log_likelihood[row] == -kInfinity &&
+                 !iteration.predictions.row(i).allFinite()) {
         ensemble.log_start[row] = -kInfinity;
         ++ensemble.diverged;
       } else if (ensemble.log_start[row] == -kInfinity && !IsGiven(iteration, i)) {
@@ -83,7 +91,8 @@ std::string NoWeight(const Ensemble& ensemble) {
   std::string text =
       absl::StrCat("no sample has a weight: of ", n, " samples ", ensemble.diverged,
                    " did not come to their ends and ", ensemble.outside, " lie outside the prior");
-  const Eigen::Index impossible = n - ensemble.diverged - ensemble.outside;
+  if (ensemble.aside > 0) absl::StrAppend(&text, "; ", ensemble.aside, " are unknown");
+  const Eigen::Index impossible = n - ensemble.diverged - ensemble.outside - ensemble.aside;
   if (impossible > 0) {
     absl::StrAppend(&text, "; the other ", impossible,
                     " are so far from the readings that their likelihood is zero: state larger "

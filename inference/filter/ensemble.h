@@ -28,10 +28,11 @@ struct Ensemble {
       increments;  ///< N x T, ln p(y_t | earlier, sample); NaN from where a diverged sample ends
   Eigen::VectorXd log_likelihood;  ///< N; -infinity: diverged
   Eigen::Index diverged = 0;       ///< samples with a prediction that is not finite
+  Eigen::Index aside = 0;          ///< of which nothing is known
   Eigen::Index outside = 0;        ///< undiverged samples outside the prior's support
   /// Samples outside the prior's support of iterations without log_proposal, which count as draws
-  /// from the prior: a table of runs that was made for a wider one; and samples that were drawn
-  /// from no density. Their weight is zero, and the evidence is a mean without them.
+  /// from the prior: a table of runs that was made for a wider one; samples that were drawn from no
+  /// density, and those set aside. Their weight is zero, and the evidence is a mean without them.
   Eigen::Index strangers = 0;
   std::optional<double> sigma;  ///< kEssTarget alone: the sigma found
   Tempering tempering;          ///< kEssTarget alone: how it was found (exponent = 1 / sigma)

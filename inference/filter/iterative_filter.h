@@ -77,6 +77,9 @@ struct Iteration {
   /// N x T or empty: runs stopped early as far as they came, NaN beyond and in the rows of others.
   /// To the weights they are diverged; an emulator learns from them (emulator/stopped_runs.h).
   Eigen::MatrixXd stopped = {};
+  /// N or empty: not 0 where nothing is known of a sample, whatever `predictions` holds. It has no
+  /// weight, and the evidence is a mean without it.
+  std::vector<char> aside = {};
 };
 
 /// ln of the mass that a mixture, in standardised coordinates, has inside the support of the

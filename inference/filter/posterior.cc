@@ -108,7 +108,7 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
   if (ensemble.outside > 0) {
     warnings.push_back(absl::StrCat(
         ensemble.outside, " of ", total, " samples lie outside the prior and have weight zero",
-        ensemble.strangers > 0 ? "; the others count as draws from it." : "."));
+        ensemble.strangers > ensemble.aside ? "; the others count as draws from it." : "."));
   }
   if (options.noise == NoiseMode::kEssTarget) {
     warnings.push_back(absl::StrCat("The noise level sigma = ", *posterior.sigma,

@@ -43,6 +43,7 @@ std::string ProgressText(const v1::CampaignStatus& s) {
     text += fmt::format("  {} stopped early", s.samples_stopped_early());
   }
   if (s.samples_diverged() > 0) text += fmt::format("  {} diverged", s.samples_diverged());
+  if (s.samples_unknown() > 0) text += fmt::format("  {} unknown", s.samples_unknown());
   if (s.effective_sample_size() > 0) {
     text += "  ESS " + report::Number(s.effective_sample_size(), 2);
   }

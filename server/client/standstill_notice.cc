@@ -38,6 +38,11 @@ void StandstillNotice::Look(const v1::CampaignStatus& status) {
   }
   if (said_ || now - idle_since_ < patience_) return;
   idle_since_ = now;
+  if (!status.nobody_may().empty()) {
+    said_ = true;
+    std::cerr << "\nnothing runs: " << status.nobody_may() << "\n";
+    return;
+  }
   if (!NeedsWorkers(session_.client(), status.campaign())) return;
   const auto workers = session_.client().ListWorkers();
   if (!workers.ok() || std::any_of(workers->begin(), workers->end(),

@@ -246,6 +246,9 @@ std::string StatusText(const v1::CampaignStatus& s) {
                      client::ProgressText(s), s.model_evaluations(), Number(s.core_hours(), 3),
                      s.method()) +
          (s.problem().empty() ? "" : report::Wrapped(s.problem(), "! ", "  ")) +
+         (s.nobody_may().empty()
+              ? ""
+              : report::Wrapped("Nothing runs: " + s.nobody_may() + ".", "! ", "  ")) +
          (s.server_waits().empty() ? "" : report::Wrapped(s.server_waits(), "! ", "  "));
 }
 

@@ -4,10 +4,14 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <variant>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
+#include "server/campaign/model/race.h"
 #include "server/campaign/model/sha256.h"
 
 namespace calib::messages {
@@ -41,6 +45,8 @@ void SetSpecimen(const campaign::PackingLike& like, v1::AttemptSpec& spec) {
 
 void SetSpecimen(const campaign::NoPacking& /*none*/, v1::AttemptSpec& /*spec*/) {}
 
+void SetSpecimen(const campaign::ProgramSpecimen& /*none*/, v1::AttemptSpec& /*spec*/) {}
+
 v1::Staging ToMessage(const dem::Staging& staging) {
   v1::Staging message;
   if (staging.rate.has_value()) {
@@ -60,6 +66,41 @@ v1::Staging ToMessage(const dem::Staging& staging) {
   }
   message.set_adaptive(staging.adaptive);
   return message;
+}
+
+void SetLimits(const campaign::ProgramLimits& limits, v1::ProgramLimits& message) {
+  if (limits.wall) message.set_wall(*limits.wall);
+  if (limits.memory) message.set_memory(*limits.memory);
+  if (limits.disk) message.set_disk(*limits.disk);
+  if (limits.silence) message.set_silence(*limits.silence);
+}
+
+// The columns that the observables of an experiment are read from.
+v1::ProgramTable TableOf(const campaign::ProgramTable& table,
+                         const campaign::Experiment& experiment) {
+  v1::ProgramTable message;
+  message.set_file(table.file);
+  for (const campaign::MeasuredObservable& observable : experiment.observables) {
+    v1::ProgramColumn& column = *message.add_columns();
+    column.set_name(observable.name);
+    const auto named = table.columns.find(observable.name);
+    column.set_column(named != table.columns.end() ? named->second : observable.name);
+    const auto factor = table.factors.find(observable.name);
+    column.set_factor(factor != table.factors.end() ? factor->second : 1);
+  }
+  return message;
+}
+
+// The same bytes for equal messages.
+std::string BytesOf(const google::protobuf::Message& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);  // maps in the order of their keys
+    message.SerializeToCodedStream(&coded);
+  }
+  return bytes;
 }
 
 // Declared effects that the model does not use have no part in what a run is.
@@ -145,17 +186,81 @@ v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
   return spec;
 }
 
-std::string SpecDigest(v1::AttemptSpec spec) {
+v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
+                            const campaign::RunOf& run) {
+  const campaign::Program& program = *campaign.program;
+  const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
+  v1::ProgramRun message;
+  message.mutable_command()->Add(program.command.begin(), program.command.end());
+  for (const campaign::ProgramFile& file : program.files) {
+    v1::ProgramFile& added = *message.add_files();
+    added.set_name(file.name);
+    added.set_digest(file.digest);
+    added.set_executable(file.executable);
+    added.set_is_template(file.is_template);
+  }
+  message.mutable_keep()->Add(program.keep.begin(), program.keep.end());
+  message.set_checkpoint(program.checkpoint);
+  message.set_persistent(program.persistent);
+  if (program.states) *message.mutable_states() = TableOf(*program.states, measured);
+  SetLimits(program.limits, *message.mutable_limits());
+  message.set_limit_diverges(program.limit_diverges);
+  message.set_version(program.version);
+  message.set_experiment(measured.name);
+  const auto realization = static_cast<std::size_t>(run.stream) % measured.specimens.size();
+  message.set_realization(static_cast<int>(realization));
+  const dem::Model model = campaign::ModelOf(campaign, run.values);
+  message.mutable_parameters()->insert(model.parameters.begin(), model.parameters.end());
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    if (model.parameters.contains(parameter.name)) {
+      (*message.mutable_units())[parameter.name] = parameter.unit;
+    }
+  }
+  message.mutable_effects()->Add(model.effects.begin(), model.effects.end());
+  campaign::ProgramSettings told = measured.told;
+  if (const auto* own = std::get_if<campaign::ProgramSpecimen>(&measured.specimens[realization])) {
+    told.insert(own->settings.begin(), own->settings.end());
+  }
+  std::vector<std::string> members;
+  for (const auto& [name, value] : told) {
+    members.push_back(absl::StrCat(nlohmann::json(name).dump(), ":", value));
+  }
+  message.set_settings(absl::StrCat("{", absl::StrJoin(members, ","), "}"));
+  message.set_control(measured.control_name);
+  for (const dem::ControlPoint& point : measured.path) {
+    if (point.load_step >= 0) message.add_control_values(point.target);
+  }
+  for (const campaign::MeasuredObservable& observable : measured.observables) {
+    message.add_observables(observable.name);
+  }
+  constexpr std::uint64_t kLargestSeed = 0x7fffffff;
+  message.set_seed(static_cast<int>((campaign.seed + realization) & kLargestSeed));
+  return message;
+}
+
+v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const campaign::RunOf& run) {
+  v1::Lease lease;
+  if (campaign.program) {
+    *lease.mutable_program() = ProgramRunOf(campaign, experiment, run);
+  } else {
+    *lease.mutable_spec() = SpecOf(campaign, experiment, run);
+  }
+  return lease;
+}
+
+std::string RunDigest(v1::Lease run) {
+  if (run.has_program()) {
+    v1::ProgramRun& program = *run.mutable_program();
+    program.clear_threads();
+    program.clear_limits();
+    program.clear_limit_diverges();
+    program.clear_keep();
+    return campaign::Sha256Hex(absl::StrCat("program\n", BytesOf(program)));
+  }
+  v1::AttemptSpec& spec = *run.mutable_spec();
   spec.clear_experiment();
   spec.clear_threads();
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream coded(&stream);
-    coded.SetSerializationDeterministic(true);  // maps in the order of their keys
-    spec.SerializeToCodedStream(&coded);
-  }
-  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", bytes));
+  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", BytesOf(spec)));
 }
 
 }  // namespace calib::messages

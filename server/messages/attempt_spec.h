@@ -1,6 +1,6 @@
 #pragma once
-// dem::Scenario -> AttemptSpec: what a worker is told, and the digest by which equal evaluations
-// are recognised.
+// A run of a campaign -> what a worker is told: an AttemptSpec of this tree's DEM or a ProgramRun
+// of the user's program; and the digest by which equal evaluations are recognised.
 
 #include <string>
 
@@ -15,12 +15,20 @@ namespace calib::messages {
 v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
                        const std::string& experiment);
 
-/// The spec of one evaluation.
+/// The spec of one evaluation by the DEM.
 v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
                        const campaign::RunOf& run);
 
-/// SHA-256 of everything that determines the states: the spec without its name and thread count,
-/// and the version of the mechanics.
-std::string SpecDigest(v1::AttemptSpec spec);
+/// The same by the campaign's program.
+v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
+                            const campaign::RunOf& run);
+
+/// One evaluation as a lease has it, by whichever of them; without an attempt.
+v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const campaign::RunOf& run);
+
+/// SHA-256 of everything that determines the states: of a spec all but its name and thread count,
+/// and the version of the mechanics; of a program's run all but threads, limits and what is kept of
+/// it.
+std::string RunDigest(v1::Lease run);
 
 }  // namespace calib::messages

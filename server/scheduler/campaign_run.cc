@@ -19,7 +19,8 @@ namespace {
 
 /// Ended by itself: nothing lets it go on.
 bool IsForGood(EvaluationStatus status) {
-  return status == EvaluationStatus::kFinished || status == EvaluationStatus::kDiverged;
+  return status == EvaluationStatus::kFinished || status == EvaluationStatus::kDiverged ||
+         status == EvaluationStatus::kUnknown;
 }
 
 }  // namespace
@@ -178,8 +179,8 @@ CampaignRun::Evaluation* CampaignRun::Find(const EvaluationKey& key) {
 void CampaignRun::FindOtherMechanics() {
   for (const auto& [key, evaluation] : evaluations_) {
     if (IsForGood(evaluation.status) || evaluation.digest.empty()) continue;
-    std::string digest = messages::SpecDigest(
-        messages::SpecOf(definition_->campaign, key.experiment, samples_.at(key.sample)));
+    std::string digest = messages::RunDigest(
+        messages::LeaseOf(definition_->campaign, key.experiment, samples_.at(key.sample)));
     if (digest != evaluation.digest) of_other_mechanics_[key] = std::move(digest);
   }
 }
@@ -229,6 +230,13 @@ std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
              : std::vector<EvaluationKey>(found->second.begin(), found->second.end());
 }
 
+std::vector<EvaluationKey> CampaignRun::UnknownOfRunningIteration() const {
+  std::vector<EvaluationKey> unknown = With(EvaluationStatus::kUnknown);
+  std::erase_if(unknown,
+                [this](const EvaluationKey& key) { return !IsOfRunningIteration(key.sample); });
+  return unknown;
+}
+
 bool CampaignRun::AllTerminal() const {
   return std::all_of(by_status_.begin(), by_status_.end(), [](const auto& item) {
     return item.second.empty() || campaign::IsTerminal(item.first);
@@ -275,7 +283,8 @@ std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
     return absl::StrCat("load step ", load_step, " is behind load step ", *rest,
                         ", where the run was to rest");
   }
-  if (observables.size() != definition_->StateSize(key.experiment)) {
+  const bool only_others = observables.empty() && definition_->campaign.program.has_value();
+  if (!only_others && observables.size() != definition_->StateSize(key.experiment)) {
     return absl::StrCat("a state of ", observables.size(), " values, expected ",
                         definition_->StateSize(key.experiment));
   }
@@ -308,6 +317,7 @@ bool CampaignRun::IsOfRunningIteration(int sample) const {
 
 void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
+  if (observables.empty()) return;  // what a program told besides
   ++changes_;
   evaluations_[key].missing.erase(load_step);
   if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
@@ -324,7 +334,8 @@ void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, i
   evaluation.failures = failures;
   const auto found = arrived_.find(key.sample);
   if (found != arrived_.end() &&
-      (status == EvaluationStatus::kDiverged || status == EvaluationStatus::kStoppedEarly)) {
+      (status == EvaluationStatus::kDiverged || status == EvaluationStatus::kStoppedEarly ||
+       status == EvaluationStatus::kUnknown)) {
     found->second.out = true;
   }
 }
@@ -399,9 +410,11 @@ int CampaignRun::Diverged() const {
   const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
   const std::set<int> ended = overlaps ? EndedForPause() : std::set<int>{};
   std::set<int> samples;
-  for (const EvaluationKey& key : With(EvaluationStatus::kDiverged)) {
-    if (overlaps ? ended.count(key.sample) > 0 : IsOfRunningIteration(key.sample)) {
-      samples.insert(key.sample);
+  for (const EvaluationStatus status : {EvaluationStatus::kDiverged, EvaluationStatus::kUnknown}) {
+    for (const EvaluationKey& key : With(status)) {
+      if (overlaps ? ended.count(key.sample) > 0 : IsOfRunningIteration(key.sample)) {
+        samples.insert(key.sample);
+      }
     }
   }
   return static_cast<int>(samples.size());

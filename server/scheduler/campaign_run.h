@@ -3,6 +3,7 @@
 // does so far. It mirrors the store; after a restart, and after a plan that resumes what had
 // ended, it is read again from there. What a plan adds is read beside what is known.
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -34,6 +35,9 @@ class CampaignRun {
   struct Evaluation {
     store::EvaluationStatus status = store::EvaluationStatus::kWaiting;
     int failures = 0;
+    /// Attempts of a program's run that were lost with their node since the server started; its
+    /// own failures are `failures`.
+    int losses = 0;
     std::set<int> missing{};  ///< load steps not yet there
     std::optional<int> rest_after{};
     std::string held_in{};  ///< see store::EvaluationRecord
@@ -63,6 +67,8 @@ class CampaignRun {
   Evaluation* Find(const store::EvaluationKey& key);
   /// Keys with this status, in order.
   std::vector<store::EvaluationKey> With(store::EvaluationStatus status) const;
+  /// What a program failed on as often as it may, of samples that no posterior has taken in yet.
+  std::vector<store::EvaluationKey> UnknownOfRunningIteration() const;
   bool AllTerminal() const;
   /// Whether a plan may have something to say: everything has ended, or the campaign decides while
   /// runs are under way (decisions.h) and something has ended that no plan has seen.
@@ -82,6 +88,14 @@ class CampaignRun {
   /// Load steps of an experiment's path.
   std::size_t PathLength(int experiment) const {
     return positions_.at(static_cast<std::size_t>(experiment)).size();
+  }
+  /// Whether a worker that may run these programs (Hello::programs) may run the campaign's.
+  template <typename Names>
+  bool MayBeRunBy(const Names& programs) const {
+    const auto& program = definition_->campaign.program;
+    return !program || std::any_of(programs.begin(), programs.end(), [&](const auto& name) {
+      return name == "*" || name == program->command.front();
+    });
   }
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
   std::string Refusal(const store::EvaluationKey& key, int load_step,
@@ -103,8 +117,9 @@ class CampaignRun {
   /// Another threshold for that, see store::SampleRecord.
   void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
-  /// Samples of the running iteration of which an evaluation diverged, and those with nothing left
-  /// to run; of surrogate_msrs the last that have ended, as many as its first iteration has.
+  /// Samples of the running iteration of which an evaluation diverged or is unknown, and those with
+  /// nothing left to run; of surrogate_msrs the last that have ended, as many as its first
+  /// iteration has.
   int Diverged() const;
   int Done() const;
 

@@ -13,11 +13,11 @@ namespace calib::scheduler {
 namespace {
 
 /// Position of an experiment's observable in its states: tables made elsewhere hold the measured
-/// ones alone.
+/// ones alone, and a program is asked for them alone.
 std::size_t PositionInState(const campaign::Campaign& campaign,
                             const campaign::Experiment& experiment, int observable) {
   const auto index = static_cast<std::size_t>(observable);
-  if (campaign.precomputed.has_value()) {
+  if (campaign.precomputed.has_value() || campaign.program.has_value()) {
     return index;
   }
   const auto& names = dem::FindTest(experiment.test)->observables;
@@ -71,8 +71,9 @@ std::vector<int> Definition::LoadSteps(int experiment) const {
 
 std::size_t Definition::StateSize(int experiment) const {
   const auto& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
-  return campaign.precomputed.has_value() ? measured.observables.size()
-                                          : dem::FindTest(measured.test)->observables.size();
+  return campaign.precomputed.has_value() || campaign.program.has_value()
+             ? measured.observables.size()
+             : dem::FindTest(measured.test)->observables.size();
 }
 
 std::vector<int> Definition::ExperimentsOf(campaign::Role role) const {

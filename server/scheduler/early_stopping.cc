@@ -196,6 +196,39 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   return loss;
 }
 
+absl::StatusOr<double> UnknownMass(const Definition& definition, const History& history) {
+  if (history.unknown.empty()) return 0;
+  if (definition.campaign.filter.noise == inference::NoiseMode::kEssTarget) return store::kUnknown;
+  const Eigen::VectorXd importance =
+      inference::LogImportance(definition.priors, history.iterations);
+  ASSIGN_OR_RETURN(const auto finished, FinishedMass(definition, history, importance));
+  if (!std::isfinite(finished.log_mass)) return store::kUnknown;
+  std::vector<Eigen::VectorXd> bounds;
+  double best = kNoMass;  // log likelihood of those that finished
+  for (std::size_t k = 0; k < history.iterations.size(); ++k) {
+    ASSIGN_OR_RETURN(auto bound,
+                     inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
+                                                   history.stopped[k]));
+    bounds.push_back(std::move(bound));
+    ASSIGN_OR_RETURN(const auto likelihood,
+                     inference::LogLikelihood(definition.data, definition.campaign.filter,
+                                              history.iterations[k].predictions));
+    for (const double one : likelihood) {
+      if (std::isfinite(one)) best = std::max(best, one);
+    }
+  }
+  double mass = 0;
+  std::size_t at = 0;
+  for (const Eigen::VectorXd& bound : bounds) {
+    for (Eigen::Index i = 0; i < bound.size(); ++i, ++at) {
+      if (history.unknown.count(history.samples[at].sample) == 0) continue;
+      const double most = finished.exponent * std::min(bound(i), best);
+      mass += std::exp(importance(static_cast<Eigen::Index>(at)) + most - finished.log_mass);
+    }
+  }
+  return mass;
+}
+
 std::vector<int> ToAudit(const Definition& definition, const History& history, const Loss& loss) {
   std::size_t audited = 0;
   std::vector<std::pair<double, int>> order;

@@ -67,6 +67,12 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
 /// one) is audited. Empty: enough are.
 std::vector<int> ToAudit(const Definition& definition, const History& history, const Loss& loss);
 
+/// What the samples set aside as unknown (History::unknown) could hold at most, relative to the
+/// finished mass: each as likely as the best sample that finished, or as its states so far allow,
+/// whichever is less. NaN where that cannot be told: no sample has a weight, or errors are found by
+/// ess_target.
+absl::StatusOr<double> UnknownMass(const Definition& definition, const History& history);
+
 struct Audit {
   int samples = 0;
   double bound = 0;     ///< what they might have held of the finished mass when they were chosen

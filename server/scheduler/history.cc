@@ -178,9 +178,21 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   for (const auto& key : WithStatus(evaluations, store::EvaluationStatus::kDiverged)) {
     without_weight.insert(key.sample);
   }
+  for (const auto& key : WithStatus(evaluations, store::EvaluationStatus::kUnknown)) {
+    without_weight.insert(key.sample);
+  }
   std::erase_if(stopped, [&without_weight](const store::EvaluationKey& key) {
     return without_weight.count(key.sample) > 0;
   });
+  for (const auto& key : WithStatus(evaluations, store::EvaluationStatus::kUnknown)) {
+    if (place.count(key.sample) > 0) history.unknown.insert(key.sample);
+  }
+  for (const int sample : history.unknown) {
+    const auto [k, row] = place.at(sample);
+    std::vector<char>& aside = history.iterations[k].aside;
+    aside.resize(static_cast<std::size_t>(history.iterations[k].parameters.rows()), 0);
+    aside[static_cast<std::size_t>(row)] = 1;
+  }
   std::set<int> stopped_samples;
   std::set<int> begun;  // of those: the others were rejected without a run
   for (const store::EvaluationKey& key : stopped) {
@@ -194,6 +206,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     const auto [k, row] = found->second;
     if (finished.count(state.key) > 0) {
       PlaceState(definition, state, row, history.iterations[k].predictions);
+    }
+    if (history.unknown.count(state.key.sample) > 0) {
+      PlaceState(definition, state, row, history.stopped[k]);
     }
     if (stopped_samples.count(state.key.sample) > 0) {
       PlaceState(definition, state, row, history.stopped[k]);

@@ -25,6 +25,9 @@ struct History {
   std::map<store::EvaluationKey, int> resting;     ///< those with a rung: they came no
                                                    ///< further than this load step
   std::set<store::EvaluationKey> begun;            ///< of those stopped early: they gave a state
+  /// Samples on which a program failed as often as it may; their rows of `stopped` are as far as
+  /// they came, and `iterations` has them set aside.
+  std::set<int> unknown{};
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<std::vector<char>> ended;      ///< likewise: nothing of it is waiting or running
   std::vector<store::SampleRecord> samples;  ///< of all iterations

@@ -216,7 +216,7 @@ class Planner {
           "the twins show no scatter (they have not parted, or fewer than two came to their ends): "
           "none of it is among the errors");
     }
-    plan_.converged = outcome->converged;
+    plan_.converged = outcome->converged && UnknownIsSmall();
     AddConclusion(*outcome);
     if (replicating_) {
       return Validate(outcome->answer);
@@ -265,6 +265,7 @@ class Planner {
       conclusion.posterior.add_warnings(left_out);
     }
     conclusion.posterior.set_stated_loss(stated_loss_);
+    TellUnknown(conclusion.posterior);
     if (audit_.samples > 0) {
       conclusion.posterior.set_audited(audit_.samples);
       conclusion.posterior.set_audited_bound(audit_.bound);
@@ -280,6 +281,43 @@ class Planner {
         posterior.ess, " effective samples, posterior from ", conclusion.posterior.posterior_from(),
         std::isfinite(evidence) ? absl::StrCat(", log evidence ", evidence) : ""));
     plan_.conclusion = std::move(conclusion);
+  }
+
+  /// Bound on the posterior mass that a campaign may leave out.
+  double MayLeaveOut() const {
+    return campaign_.early_stopping.value_or(campaign::EarlyStopping{}).discard_at_most;
+  }
+
+  /// Relative to the finished mass; NaN: nobody can tell.
+  double UnknownMassNow() const {
+    if (history_.unknown.empty()) return 0;
+    if (!campaign::IsFilter(campaign_.method)) return store::kUnknown;
+    const auto mass = UnknownMass(definition_, history_);
+    return mass.ok() ? *mass : store::kUnknown;
+  }
+
+  bool UnknownIsSmall() const {
+    return history_.unknown.empty() || UnknownMassNow() <= MayLeaveOut();
+  }
+
+  void TellUnknown(v1::Posterior& posterior) const {
+    if (history_.unknown.empty()) return;
+    const double mass = UnknownMassNow();
+    posterior.set_unknown(static_cast<int>(history_.unknown.size()));
+    posterior.set_unknown_mass(mass);
+    const std::string held =
+        std::isnan(mass) ? "what they could hold of the posterior is not known"
+                         : absl::StrCat("they could hold ", mass, " of the posterior mass at most");
+    const std::string verdict =
+        mass <= MayLeaveOut()
+            ? "."
+            : absl::StrCat(", more than the ", MayLeaveOut(),
+                           " that may be left out (early_stopping.discard_at_most): not converged. "
+                           "`calibctl samples` says what their program printed last.");
+    posterior.add_warnings(absl::StrCat(history_.unknown.size(), " of ", history_.samples.size(),
+                                        " samples are unknown, for the program failed on them as "
+                                        "often as it may, and are set aside; ",
+                                        held, verdict));
   }
 
   bool TwinsShowNothing() const {

@@ -55,7 +55,7 @@ absl::Status Requests::Request(const store::SampleRecord& sample,
   for (const int experiment : experiments) {
     store::EvaluationRecord evaluation{
         .key = {id_, sample.sample, experiment},
-        .digest = messages::SpecDigest(messages::SpecOf(definition_.campaign, experiment,
+        .digest = messages::RunDigest(messages::LeaseOf(definition_.campaign, experiment,
                                                         ToRun(definition_.campaign, sample)))};
     if (reuse) {
       ASSIGN_OR_RETURN(const auto equal, reader_.FindEqual(evaluation.digest));

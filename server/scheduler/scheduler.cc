@@ -409,7 +409,10 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
     others = run->OfOtherMechanics();
     anew = BeginAnew(*run, others);
     again = run->With(EvaluationStatus::kFailed);
+    const auto unknown = run->UnknownOfRunningIteration();
+    again.insert(again.end(), unknown.begin(), unknown.end());
     for (const EvaluationKey& key : again) {
+      run->Find(key)->losses = 0;
       run->SetStatus(key, EvaluationStatus::kWaiting, 0);
     }
   }
@@ -533,7 +536,27 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
         run->With(EvaluationStatus::kWaiting).size() + run->With(EvaluationStatus::kRunning).size();
     live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
   }
+  const auto& program = run->definition().campaign.program;
+  if (program && !run->With(EvaluationStatus::kWaiting).empty()) {
+    live.nobody_may = WhyNobodyMay(*run);
+  }
   return live;
+}
+
+std::string Scheduler::WhyNobodyMay(const CampaignRun& run) const {
+  const std::string& command = run.definition().campaign.program->command.front();
+  int connected = 0;
+  for (const auto& [name, worker] : workers_.all()) {
+    if (worker.session == 0) continue;
+    ++connected;
+    if (run.MayBeRunBy(worker.hello.programs())) return "";
+  }
+  const bool brought = command.find('/') != std::string::npos && command.front() != '/';
+  return absl::StrCat(
+      connected == 0 ? absl::StrCat("no worker is connected; this campaign runs ", command)
+                     : absl::StrCat("none of ", connected, " connected workers may run ", command),
+      ": start one with --allow-command ",
+      brought ? "'*' (the program is brought along, so that it has to allow any)" : command);
 }
 
 double Scheduler::StatesPerSecond(std::int64_t campaign) {
@@ -557,10 +580,11 @@ std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last
       diverged <= failure.pause_above * samples) {
     return "";
   }
-  return absl::StrCat(diverged, " of ", samples,
-                      " samples diverged, more than failure.pause_above = ", failure.pause_above,
-                      " allows, last: ", last,
-                      "; see the reasons of the samples, then resume or cancel");
+  return absl::StrCat(
+      diverged, " of ", samples,
+      run.definition().campaign.program ? " samples diverged or are unknown" : " samples diverged",
+      ", more than failure.pause_above = ", failure.pause_above, " allows, last: ", last,
+      "; see the reasons of the samples, then resume or cancel");
 }
 
 void Scheduler::Advance(std::int64_t campaign) {

@@ -37,6 +37,7 @@ struct LiveStatus {
   LiveView view{};          ///< as it was computed last, aside
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
   double states_per_second = 0;
+  std::string nobody_may{};  ///< why no connected worker may run its program; empty: one may
 };
 
 /// When something of a campaign changed last, as versions of the scheduler; 0: not since it
@@ -154,6 +155,10 @@ class Scheduler {
   void Rest(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished,
             const std::string& held_in);
   /// The sample cannot count any more: stores what decided it and lets the worker stop.
+  /// A program failed: done again, or set aside as unknown.
+  void ModelFailed(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished);
+  /// Of a campaign with a program: why no worker that is connected may run it; empty: one may.
+  std::string WhyNobodyMay(const CampaignRun& run) const;
   void StopEarly(std::int64_t session, const LeaseEntry& lease,
                  std::vector<store::StateRecord> records);
   store::AttemptEnd ToRecord(const v1::Finished& finished, store::AttemptOutcome outcome);

@@ -5,6 +5,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
+#include "server/messages/others.h"
 #include "server/scheduler/scheduler.h"
 
 namespace calib::scheduler {
@@ -221,7 +222,8 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   for (const v1::State& state : batch.states()) {
     store::StateRecord record{.key = key,
                               .load_step = state.load_step(),
-                              .observables = {state.values().begin(), state.values().end()}};
+                              .observables = {state.values().begin(), state.values().end()},
+                              .others = messages::OthersToText(state.others())};
     if (const std::string refusal = run.Refusal(key, record.load_step, record.observables);
         !refusal.empty()) {
       fail(refusal);
@@ -300,11 +302,30 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       GiveBack(lease, finished, AttemptOutcome::kStopped, false);
       Refuse(session, finished.attempt());
       break;
+    case v1::Finished::OUTCOME_MODEL_FAILED:
+      ModelFailed(session, lease, finished);
+      break;
     default:
       GiveBack(lease, finished, AttemptOutcome::kFailed, true);
       Refuse(session, finished.attempt());
   }
   Dispatch();
+}
+
+void Scheduler::ModelFailed(std::int64_t session, const LeaseEntry& lease,
+                            const v1::Finished& finished) {
+  CampaignRun& run = *FindRun(lease.key.campaign);
+  const int failures = run.Find(lease.key)->failures + 1;
+  if (failures < run.definition().campaign.failure.attempts) {
+    GiveBack(lease, finished, AttemptOutcome::kModelFailed, true);
+    Refuse(session, finished.attempt());
+    return;
+  }
+  run.SetStatus(lease.key, EvaluationStatus::kRunning, failures);
+  v1::Finished last = finished;
+  last.set_reason(absl::StrCat("failed ", failures, failures == 1 ? " time, " : " times, ",
+                               "last: ", finished.reason()));
+  End(session, lease, EvaluationStatus::kUnknown, last);
 }
 
 void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
@@ -361,7 +382,8 @@ store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, AttemptOutco
           .steps = finished.steps(),
           .contact_updates = finished.contact_updates(),
           .core_seconds = finished.core_seconds(),
-          .staging = finished.staging()};
+          .staging = finished.staging(),
+          .words = finished.words()};
 }
 
 void Scheduler::Rest(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished,
@@ -385,13 +407,15 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
     Concluded(lease.key.campaign);
   }
   const bool diverged = status == EvaluationStatus::kDiverged;
+  const bool unknown = status == EvaluationStatus::kUnknown;
   const bool resting = status == EvaluationStatus::kStoppedEarly;
   const std::string digest = resting ? "" : run.Find(lease.key)->digest;
   ending_[lease.attempt] = digest;
   const store::Store::Job end =
-      [key = lease.key, status, failures, diverged, resting, held_in, now = ports_.UnixMs(),
-       name = NameOf(run, lease.key),
+      [key = lease.key, status, failures, diverged, unknown, resting, held_in,
+       now = ports_.UnixMs(), name = NameOf(run, lease.key),
        end = ToRecord(finished, diverged  ? AttemptOutcome::kDiverged
+                                : unknown ? AttemptOutcome::kModelFailed
                                 : resting ? AttemptOutcome::kResting
                                           : AttemptOutcome::kCompleted)](Transaction& t) {
         t.EndAttempt(end);
@@ -401,6 +425,9 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
         }
         if (diverged) {
           t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
+        }
+        if (unknown) {
+          t.Log(key.campaign, now, absl::StrCat(name, " is set aside as unknown: ", end.reason));
         }
       };
   const Reply then = [this, session, lease, states = finished.states(),
@@ -423,7 +450,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
     }
     Dispatch();
   };
-  const std::string too_many = diverged ? TooManyDiverged(run, finished.reason()) : "";
+  const std::string too_many = diverged || unknown ? TooManyDiverged(run, finished.reason()) : "";
   if (too_many.empty()) {
     Write(lease.key.campaign, end, then);
   } else {  // with its cause or not at all
@@ -443,8 +470,14 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
                  [](const absl::Status&) {});
     return;
   }
-  const int failures = run->Find(lease.key)->failures + (counts_as_failure ? 1 : 0);
-  const bool too_often = failures >= run->definition().campaign.failure.attempts;
+  CampaignRun::Evaluation& evaluation = *run->Find(lease.key);
+  const campaign::Campaign& campaign = run->definition().campaign;
+  // What a program itself failed at is counted apart from lost nodes.
+  const bool by_node = campaign.program && outcome != AttemptOutcome::kModelFailed;
+  evaluation.losses += counts_as_failure && by_node ? 1 : 0;
+  const int failures = evaluation.failures + (counts_as_failure && !by_node ? 1 : 0);
+  const int counted = by_node ? evaluation.losses : failures;
+  const bool too_often = counts_as_failure && counted >= campaign.failure.attempts;
   const auto status = too_often ? EvaluationStatus::kFailed : EvaluationStatus::kWaiting;
   run->SetStatus(lease.key, status, failures);
   const store::Store::Job end = [key = lease.key, status, failures, now = ports_.UnixMs(),
@@ -457,7 +490,7 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   };
   if (too_often && IsLeasable(run->state())) {  // with its cause or not at all
     SetState(*run, CampaignEvent::kPause,
-             absl::StrCat(NameOf(*run, lease.key), " failed ", failures, " times, last: ",
+             absl::StrCat(NameOf(*run, lease.key), " failed ", counted, " times, last: ",
                           finished.reason(), "; resume to try again once the cause is removed"),
              end, [](const absl::Status&) {});
     return;
@@ -490,6 +523,7 @@ std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker,
   const Clock::time_point heard_since = ports_.Now() - options_.lease;
   for (const EvaluationKey& key : queue_) {
     const CampaignRun::Evaluation& evaluation = *FindRun(key.campaign)->Find(key);
+    if (!FindRun(key.campaign)->MayBeRunBy(worker.hello.programs())) continue;
     if (under_way.count(evaluation.digest) > 0 && IsShared(key)) continue;
     if (!FindRun(key.campaign)->IsItsTurn(key)) continue;
     const std::string& held_in = evaluation.held_in;
@@ -513,10 +547,14 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
     SetState(run, CampaignEvent::kStart, "", nullptr, [](const absl::Status&) {});
   }
   v1::ServerMessage message;
+  *message.mutable_lease() =
+      messages::LeaseOf(run.definition().campaign, key.experiment, run.RunOfSample(key.sample));
   message.mutable_lease()->set_attempt(attempt);
-  *message.mutable_lease()->mutable_spec() =
-      messages::SpecOf(run.definition().campaign, key.experiment, run.RunOfSample(key.sample));
-  message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
+  if (message.lease().has_program()) {
+    message.mutable_lease()->mutable_program()->set_threads(worker.hello.threads_per_slot());
+  } else {
+    message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
+  }
   const CampaignRun::Evaluation& evaluation = *run.Find(key);
   if (evaluation.rest_after.has_value() || !evaluation.held_in.empty()) {
     message.mutable_lease()->set_run(evaluation.digest);
@@ -594,6 +632,8 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
     info.set_engine_version(entry.hello.engine_version());
     info.set_draining(entry.draining);
     info.set_connected(entry.session != 0);
+    *info.mutable_programs() = entry.hello.programs();
+    info.set_threads(entry.hello.threads_per_slot());
     info.set_left(entry.leaving && entry.session == 0);
     info.set_seconds_since_heard(std::chrono::duration<double>(ports_.Now() - entry.heard).count());
     for (const LeaseEntry& lease : leases_.OfWorker(name)) {

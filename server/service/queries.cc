@@ -42,6 +42,7 @@ SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) 
       case EvaluationStatus::kDiverged:
       case EvaluationStatus::kStoppedEarly:
       case EvaluationStatus::kFailed:
+      case EvaluationStatus::kUnknown:
         return {.worst = evaluation->status,
                 .reason = evaluation->reason,
                 .at_rung = evaluation->status == EvaluationStatus::kStoppedEarly &&
@@ -91,13 +92,16 @@ void CountSamples(const store::CampaignRecord& record,
     const bool resting = open && sample_status.at_rung;
     const bool stopped = sample_status.worst == EvaluationStatus::kStoppedEarly && !resting;
     status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
+    const bool unknown = sample_status.worst == EvaluationStatus::kUnknown;
+    status.set_samples_unknown(status.samples_unknown() + (unknown ? 1 : 0));
     status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
     status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
     status.set_samples_running(status.samples_running() +
                                (sample_status.worst == EvaluationStatus::kRunning ? 1 : 0));
     status.set_samples_done(
         status.samples_done() +
-        (diverged || stopped || sample_status.worst == EvaluationStatus::kFinished ? 1 : 0));
+        (diverged || stopped || unknown || sample_status.worst == EvaluationStatus::kFinished ? 1
+                                                                                              : 0));
   }
 }
 
@@ -229,6 +233,7 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   }
   if (live.has_value()) {
     status.set_eta_seconds(live->eta_seconds);
+    status.set_nobody_may(live->nobody_may);
     status.set_states_per_second(live->states_per_second);
   }
   status.set_model_evaluations(effort.model_evaluations);
@@ -305,6 +310,7 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
   ASSIGN_OR_RETURN(const auto samples, reader.Samples(campaign));
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
   ASSIGN_OR_RETURN(const auto attempts, reader.AttemptsBySample(campaign));
+  ASSIGN_OR_RETURN(const auto words, reader.WordsBySample(campaign));
   ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
   std::map<int, SamplePurpose> purposes;  // by iteration
   for (const store::IterationRecord& iteration : iterations) {
@@ -332,6 +338,9 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     const auto made = attempts.find(sample.sample);
     message.set_purpose(ToString(purposes[sample.iteration]));
     message.set_attempts(made == attempts.end() ? 0 : made->second);
+    if (const auto said = words.find(sample.sample); said != words.end()) {
+      message.set_words(said->second);
+    }
     if (sample.stream.has_value()) {
       message.set_stream(*sample.stream);
     }

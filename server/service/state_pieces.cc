@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
+#include "server/messages/others.h"
 #include "server/scheduler/definition.h"
 #include "server/service/queries.h"
 
@@ -26,7 +27,7 @@ absl::StatusOr<std::vector<ToldExperiment>> ReadExperiments(store::Reader& reade
   for (const campaign::Experiment& experiment : read.experiments) {
     ToldExperiment& told = experiments.emplace_back();
     told.experiment = experiment.name;
-    if (read.precomputed.has_value()) {
+    if (read.precomputed.has_value() || read.program.has_value()) {
       for (const campaign::MeasuredObservable& observable : experiment.observables) {
         told.observables.push_back(observable.name);
       }
@@ -99,6 +100,9 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatePieces::Next(store::Reader& r
       v1::State& message = *messages.back().add_states();
       message.set_load_step(state.load_step);
       message.mutable_values()->Add(state.observables.begin(), state.observables.end());
+      for (const auto& [name, value] : messages::OthersFromText(state.others)) {
+        (*message.mutable_others())[name] = value;
+      }
     }
   }
   return messages;

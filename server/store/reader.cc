@@ -22,8 +22,9 @@ double ToDouble(const SQLite::Column& column) {
   return column.isNull() ? kUnknown : column.getDouble();
 }
 
-// The schema allows no other words than those of the tables.
-EvaluationStatus ToEvaluationStatus(const std::string& text) {
+// The schema allows no other words than those of the tables. aside: see migration 10.
+EvaluationStatus ToEvaluationStatus(const std::string& text, bool aside) {
+  if (aside) return EvaluationStatus::kUnknown;
   return campaign::ValueOf(campaign::kEvaluationStatusWords, text)
       .value_or(EvaluationStatus::kFailed);
 }
@@ -74,7 +75,8 @@ std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row)
                                .sample = row.getColumn(0).getInt(),
                                .experiment = row.getColumn(1).getInt()},
                        .load_step = row.getColumn(2).getInt(),
-                       .observables = ToDoubles(row.getColumn(3))});
+                       .observables = ToDoubles(row.getColumn(3)),
+                       .others = row.getColumn(4).getString()});
   }
   return records;
 }
@@ -274,22 +276,23 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
   return Guard([&] {
     std::vector<EvaluationRecord> records;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, experiment, status, reason, failures, digest, reused, rest_after, held_in "
-        "FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
+        "SELECT sample, experiment, status, reason, failures, digest, reused, rest_after, held_in, "
+        "aside FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
         campaign);
     while (row.executeStep()) {
-      records.push_back({.key = {.campaign = campaign,
-                                 .sample = row.getColumn(0).getInt(),
-                                 .experiment = row.getColumn(1).getInt()},
-                         .status = ToEvaluationStatus(row.getColumn(2).getString()),
-                         .reason = row.getColumn(3).getString(),
-                         .failures = row.getColumn(4).getInt(),
-                         .digest = row.getColumn(5).getString(),
-                         .reused = row.getColumn(6).getInt() != 0,
-                         .rest_after = row.getColumn(7).isNull()
-                                           ? std::nullopt
-                                           : std::optional<int>(row.getColumn(7).getInt()),
-                         .held_in = row.getColumn(8).getString()});
+      records.push_back(
+          {.key = {.campaign = campaign,
+                   .sample = row.getColumn(0).getInt(),
+                   .experiment = row.getColumn(1).getInt()},
+           .status =
+               ToEvaluationStatus(row.getColumn(2).getString(), row.getColumn(9).getInt() != 0),
+           .reason = row.getColumn(3).getString(),
+           .failures = row.getColumn(4).getInt(),
+           .digest = row.getColumn(5).getString(),
+           .reused = row.getColumn(6).getInt() != 0,
+           .rest_after = row.getColumn(7).isNull() ? std::nullopt
+                                                   : std::optional<int>(row.getColumn(7).getInt()),
+           .held_in = row.getColumn(8).getString()});
     }
     return records;
   });
@@ -303,7 +306,7 @@ absl::StatusOr<std::vector<StateRecord>> Reader::States(std::int64_t campaign,
   return Guard([&] {
     return ToStates(campaign,
                     connection_->Bind(
-                        "SELECT sample, experiment, load_step, observables FROM state "
+                        "SELECT sample, experiment, load_step, observables, others FROM state "
                         "WHERE campaign = ? AND sample = ? ORDER BY sample, experiment, load_step",
                         campaign, *sample));
   });
@@ -313,7 +316,7 @@ absl::StatusOr<std::vector<StateRecord>> Reader::StatesFrom(std::int64_t campaig
   return Guard([&] {
     return ToStates(campaign,
                     connection_->Bind(
-                        "SELECT sample, experiment, load_step, observables FROM state "
+                        "SELECT sample, experiment, load_step, observables, others FROM state "
                         "WHERE campaign = ? AND sample >= ? ORDER BY sample, experiment, load_step",
                         campaign, first));
   });
@@ -373,8 +376,21 @@ absl::StatusOr<std::map<int, int>> Reader::AttemptsBySample(std::int64_t campaig
   });
 }
 
-absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(
-    std::int64_t campaign, std::optional<int> sample) {
+absl::StatusOr<std::map<int, std::string>> Reader::WordsBySample(std::int64_t campaign) {
+  return Guard([&] {
+    std::map<int, std::string> words;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, words FROM attempt WHERE campaign = ? AND words <> '' ORDER BY id",
+        campaign);
+    while (row.executeStep()) {  // the last attempt's stay
+      words[row.getColumn(0).getInt()] = row.getColumn(1).getString();
+    }
+    return words;
+  });
+}
+
+absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t campaign,
+                                                                    std::optional<int> sample) {
   return Guard([&] {
     std::map<EvaluationKey, double> seconds;
     SQLite::Statement& row = connection_->Bind(

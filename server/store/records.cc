@@ -15,6 +15,7 @@ constexpr std::array kAttemptOutcomeWords = {
     Word{AttemptOutcome::kStoppedEarly, "stopped_early"},
     Word{AttemptOutcome::kStopped, "stopped"},
     Word{AttemptOutcome::kDiverged, "diverged"},
+    Word{AttemptOutcome::kModelFailed, "model_failed"},
     Word{AttemptOutcome::kFailed, "failed"},
     Word{AttemptOutcome::kLost, "lost"},
     Word{AttemptOutcome::kCancelled, "cancelled"},

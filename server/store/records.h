@@ -120,7 +120,8 @@ enum class AttemptOutcome {
   kStopped,  ///< its worker left, or other mechanics have to run it
   kDiverged,
   kFailed,
-  kLost,  ///< nothing was heard of it any more
+  kModelFailed,  ///< its program ended as it must not
+  kLost,         ///< nothing was heard of it any more
   kCancelled
 };
 const char* ToString(AttemptOutcome outcome);
@@ -135,12 +136,14 @@ struct AttemptEnd {
   std::int64_t contact_updates = 0;
   double core_seconds = 0;
   std::string staging{};
+  std::string words{};  ///< of a program that failed: what it printed last on standard error
 };
 
 struct StateRecord {
   EvaluationKey key{};
   int load_step = 0;
   std::vector<double> observables{};
+  std::string others{};  ///< JSON object of what a program told besides; empty: nothing
 };
 
 struct EventRecord {

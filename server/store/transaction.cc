@@ -15,6 +15,12 @@ namespace {
 /// Of a content in memory at a time [bytes]; chosen: some hundred pages of the file.
 constexpr std::int64_t kPieceBytes = std::int64_t{512} * 1024;
 
+/// What is unknown is a failure in the table, and set aside there (migration 10).
+bool IsAside(EvaluationStatus status) { return status == EvaluationStatus::kUnknown; }
+const char* StatusInTable(EvaluationStatus status) {
+  return ToString(IsAside(status) ? EvaluationStatus::kFailed : status);
+}
+
 }  // namespace
 
 template <typename F>
@@ -184,11 +190,11 @@ void Transaction::Audit(std::int64_t campaign, int sample, double share) {
 void Transaction::InsertEvaluation(const EvaluationRecord& evaluation) {
   Guard([&] {
     connection_.Run(
-        "INSERT INTO evaluation(campaign, sample, experiment, status, reason, failures, digest, "
-        "reused) VALUES(?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO evaluation(campaign, sample, experiment, status, aside, reason, failures, "
+        "digest, reused) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)",
         evaluation.key.campaign, evaluation.key.sample, evaluation.key.experiment,
-        ToString(evaluation.status), evaluation.reason, evaluation.failures, evaluation.digest,
-        evaluation.reused);
+        StatusInTable(evaluation.status), IsAside(evaluation.status), evaluation.reason,
+        evaluation.failures, evaluation.digest, evaluation.reused);
   });
   if (evaluation.rest_after.has_value()) {
     SetRest(evaluation.key, evaluation.rest_after);
@@ -215,9 +221,10 @@ void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus statu
                                 const std::string& reason, int failures) {
   Guard([&] {
     connection_.Run(
-        "UPDATE evaluation SET status = ?, reason = ?, failures = ? "
+        "UPDATE evaluation SET status = ?, aside = ?, reason = ?, failures = ? "
         "WHERE campaign = ? AND sample = ? AND experiment = ?",
-        ToString(status), reason, failures, key.campaign, key.sample, key.experiment);
+        StatusInTable(status), IsAside(status), reason, failures, key.campaign, key.sample,
+        key.experiment);
   });
 }
 
@@ -226,7 +233,8 @@ void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest)
     connection_.Run("DELETE FROM state WHERE campaign = ? AND sample = ? AND experiment = ?",
                     key.campaign, key.sample, key.experiment);
     connection_.Run(
-        "UPDATE evaluation SET digest = ?, held_in = '', status = ?, reason = '', failures = 0 "
+        "UPDATE evaluation SET digest = ?, held_in = '', status = ?, aside = 0, reason = '', "
+        "failures = 0 "
         "WHERE campaign = ? AND sample = ? AND experiment = ?",
         digest, ToString(EvaluationStatus::kWaiting), key.campaign, key.sample, key.experiment);
   });
@@ -242,8 +250,8 @@ void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey
         from.campaign, from.sample, from.experiment, to.campaign, to.sample, to.experiment,
         from.campaign, from.sample, from.experiment);
     connection_.Run(
-        "INSERT INTO state(campaign, sample, experiment, load_step, observables) "
-        "SELECT ?, ?, ?, load_step, observables FROM state "
+        "INSERT INTO state(campaign, sample, experiment, load_step, observables, others) "
+        "SELECT ?, ?, ?, load_step, observables, others FROM state "
         "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
         to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
   });
@@ -263,9 +271,9 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
   Guard([&] {
     connection_.Run(
         "UPDATE attempt SET ended_unix_ms = ?, outcome = ?, reason = ?, steps = ?, "
-        "contact_updates = ?, core_seconds = ?, staging = ? WHERE id = ?",
+        "contact_updates = ?, core_seconds = ?, staging = ?, words = ? WHERE id = ?",
         end.ended_unix_ms, ToString(end.outcome), end.reason, end.steps, end.contact_updates,
-        end.core_seconds, end.staging, end.id);
+        end.core_seconds, end.staging, end.words, end.id);
   });
 }
 
@@ -281,11 +289,18 @@ void Transaction::EndOpenAttempts(std::int64_t campaign, const AttemptEnd& end) 
 void Transaction::PutState(const StateRecord& state, std::int64_t unix_ms) {
   Guard([&] {
     const EvaluationKey& key = state.key;
+    if (state.observables.empty()) {  // joins the state of this step
+      connection_.Run(
+          "UPDATE state SET others = json_patch(CASE others WHEN '' THEN '{}' ELSE others END, ?) "
+          "WHERE campaign = ? AND sample = ? AND experiment = ? AND load_step = ?",
+          state.others, key.campaign, key.sample, key.experiment, state.load_step);
+      return;
+    }
     const DoubleBlob blob{state.observables};
     const int inserted = connection_.Run(
-        "INSERT INTO state(campaign, sample, experiment, load_step, observables) "
-        "VALUES(?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
-        key.campaign, key.sample, key.experiment, state.load_step, blob);
+        "INSERT INTO state(campaign, sample, experiment, load_step, observables, others) "
+        "VALUES(?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
+        key.campaign, key.sample, key.experiment, state.load_step, blob, state.others);
     if (inserted > 0) {
       return;
     }

@@ -9,7 +9,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc
 worker     .
-server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
+server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file/shared < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
            < scheduler < { service report/documents } < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
 """
 
@@ -26,7 +26,8 @@ worker            | dem proto                                                   
 server/campaign   | {CAMPAIGN_OF_DEM} inference                                            | openssl
 server/access     |                                                                        | openssl spdlog
 server/campaign/file/text |                                                                | yaml-cpp
-server/messages   | dem proto/calib server/campaign                                        | chrono
+server/campaign/file/program | {CAMPAIGN_OF_DEM} inference server/campaign                                  | nlohmann
+server/messages   | dem proto/calib server/campaign                                        | chrono nlohmann
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
 server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
 server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann

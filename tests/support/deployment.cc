@@ -43,12 +43,14 @@ bool Deployment::StartServer() {
   });
 }
 
-void Deployment::StartWorker(int slots) {
+void Deployment::StartWorker(int slots, const std::vector<std::string>& options) {
   const std::string name = "w" + std::to_string(++started_workers_);
-  workers_.emplace_back(std::vector<std::string>{Program("calib-worker"), "--server", address_,
-                                                 "--slots", std::to_string(slots), "--name", name,
-                                                 "--checkpoints", folder_ + "/checkpoints-" + name},
-                        folder_ + "/" + name + ".log");
+  std::vector<std::string> command{
+      Program("calib-worker"),         "--server", address_, "--slots",
+      std::to_string(slots),           "--name",   name,     "--checkpoints",
+      folder_ + "/checkpoints-" + name};
+  command.insert(command.end(), options.begin(), options.end());
+  workers_.emplace_back(command, folder_ + "/" + name + ".log");
 }
 
 std::string Deployment::Logs() const {

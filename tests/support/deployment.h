@@ -26,7 +26,8 @@ class Deployment {
   /// Starts calibd on a free port, or after the first time on the same port; returns once it
   /// answers.
   bool StartServer();
-  void StartWorker(int slots = 1);
+  /// options: further ones of calib-worker.
+  void StartWorker(int slots = 1, const std::vector<std::string>& options = {});
 
   Process& server() { return *server_; }
   std::vector<Process>& workers() { return workers_; }

@@ -117,7 +117,7 @@ std::vector<Warning> WarningsOf(const Campaign& campaign) {
     for (const MeasuredObservable& observable : experiment.observables) {
       AddErrorSize(experiment, observable, warnings);
     }
-    if (campaign.precomputed) continue;
+    if (campaign.precomputed || campaign.program) continue;
     AddRedundant(experiment, warnings);
     AddFewGrains(campaign, experiment, warnings);
   }

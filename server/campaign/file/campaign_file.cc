@@ -9,12 +9,12 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/scenario_problems.h"
 #include "server/campaign/checks/campaign_warnings.h"
 #include "server/campaign/checks/grain_check.h"
-#include "server/campaign/file/map_reader.h"
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_experiment.h"
 #include "server/campaign/file/read_inference.h"
 #include "server/campaign/file/read_joint_prior.h"
@@ -23,6 +23,8 @@
 #include "server/campaign/file/read_noise.h"
 #include "server/campaign/file/read_precomputed.h"
 #include "server/campaign/file/read_rows.h"
+#include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/file/shared/read_context.h"
 #include "server/campaign/file/text/workbook.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/campaign/model/excitation.h"
@@ -64,6 +66,41 @@ absl::StatusOr<std::string> ReadFromDisk(const std::filesystem::path& path) {
   content << file.rdbuf();
   if (!file) return absl::NotFoundError("no permission to read it");
   return std::move(content).str();
+}
+
+/// Files of a folder at most; a folder that holds more was not meant.
+constexpr std::size_t kMostListed = 20000;
+
+bool MayBeExecuted(const std::filesystem::path& file) {
+  constexpr auto kBits = std::filesystem::perms::owner_exec;
+  std::error_code error;
+  return (std::filesystem::status(file, error).permissions() & kBits) !=
+         std::filesystem::perms::none;
+}
+
+// What FileReader answers to a path that ends in '/'.
+absl::StatusOr<std::string> ListFromDisk(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const auto line = [](const fs::path& file, const std::string& name) {
+    return absl::StrCat(MayBeExecuted(file) ? "x " : "- ", name, "\n");
+  };
+  if (fs::is_regular_file(path, error)) return line(path, "");
+  if (!fs::exists(path, error)) return absl::NotFoundError("no such file or folder");
+  std::vector<std::string> lines;
+  fs::recursive_directory_iterator at(path, error);
+  for (const fs::recursive_directory_iterator end; !error && at != end; at.increment(error)) {
+    if (!at->is_regular_file(error)) continue;
+    if (lines.size() == kMostListed) {
+      return absl::OutOfRangeError(absl::StrCat("a folder of more than ", kMostListed, " files"));
+    }
+    lines.push_back(line(at->path(), at->path().lexically_relative(path).string()));
+  }
+  if (error) return absl::NotFoundError("no permission to read it");
+  if (lines.empty()) return absl::NotFoundError("a folder without a file");
+  std::sort(lines.begin(), lines.end(),
+            [](const std::string& a, const std::string& b) { return a.substr(2) < b.substr(2); });
+  return absl::StrJoin(lines, "");
 }
 
 void ReadName(MapReader& map, Campaign& campaign) {
@@ -141,6 +178,8 @@ FileReader DiskReader(const std::string& campaign_file_path) {
   const std::filesystem::path folder = std::filesystem::path(campaign_file_path).parent_path();
   return [folder](const std::string& path) -> absl::StatusOr<std::string> {
     ASSIGN_OR_RETURN(const auto expanded, ExpandPath(path));
+    if (expanded.ends_with('/'))
+      return ListFromDisk(folder / expanded.substr(0, expanded.size() - 1));
     const auto [name, sheet] = PartsOfSheetPath(expanded);
     const std::filesystem::path file = folder / name;  // an absolute path replaces the folder
     if (!IsWorkbookPath(name)) return ReadFromDisk(file);
@@ -181,6 +220,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadExperiments(map, context, campaign);
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
     if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
+    if (is_new && campaign.program && problems.size() == before) CheckProgram(map, campaign);
     if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
     if (is_new) CheckReplicates(map, campaign);
     if (is_new && campaign.method == Method::kDesign && problems.size() == 0) {
@@ -193,7 +233,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
       }
     }
     map.Finish();
-    if (is_new && problems.size() == 0 && !campaign.precomputed) {
+    if (is_new && problems.size() == 0 && !campaign.precomputed && !campaign.program) {
       for (const std::string& inert : EffectsWithoutPart(campaign)) map.Problem("model", inert);
       CheckMaterialsUsed(map, campaign);
       AskEngine(map, campaign, {});

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 

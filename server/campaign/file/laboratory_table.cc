@@ -42,10 +42,16 @@ std::vector<std::pair<std::string, std::string>> ReadColumns(MapReader& data, bo
   return columns;
 }
 
-std::vector<std::pair<std::string, double>> ReadUnits(MapReader& data, bool free_names) {
-  std::vector<std::pair<std::string, double>> factors;
+struct StatedUnits {
+  std::vector<std::pair<std::string, double>> factors{};     // our name, to SI
+  std::vector<std::pair<std::string, std::string>> names{};  // our name, SI unit
+};
+
+StatedUnits ReadUnits(MapReader& data, bool free_names) {
+  StatedUnits stated;
+  auto& factors = stated.factors;
   auto units = data.Map("units");
-  if (!units) return factors;
+  if (!units) return stated;
   for (const std::string& name : units->Keys()) {
     const auto text = units->Text(name);
     factors.emplace_back(name,
@@ -63,10 +69,11 @@ std::vector<std::pair<std::string, double>> ReadUnits(MapReader& data, bool free
                                         KindOfUnit(info->unit)));
     } else {
       factors.back().second = unit->factor;
+      stated.names.emplace_back(name, SiName(unit->dimension));
     }
   }
   units->Finish();
-  return factors;
+  return stated;
 }
 
 // Whether a key names something that can be read; a problem otherwise.
@@ -94,7 +101,8 @@ const Value* FindIn(const std::vector<std::pair<std::string, Value>>& pairs,
 
 std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
                                                      const std::vector<std::string>& wanted,
-                                                     bool free_names, ReadContext& context) {
+                                                     const TableNames& names,
+                                                     ReadContext& context) {
   if (experiment.Require("data", "{file: ..., columns: {our_name: column}, units: {...}}") ==
       nullptr) {
     return std::nullopt;
@@ -102,9 +110,12 @@ std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
   auto data = experiment.Map("data");
   if (!data) return std::nullopt;
   LaboratoryTable table;
-  table.columns_ = ReadColumns(*data, free_names);
-  table.factors_ = ReadUnits(*data, free_names);
-  table.ReadZeros(*data, free_names);
+  table.by_unit_only_ = names.by_unit_only;
+  table.columns_ = ReadColumns(*data, names.free);
+  StatedUnits units = ReadUnits(*data, names.free);
+  table.factors_ = std::move(units.factors);
+  table.units_ = std::move(units.names);
+  table.ReadZeros(*data, names.free);
   table.strain_ = data->Choice("strain", kStrainWords).value_or(table.strain_);
   table.derived_ = DerivedColumns::Read(*data);
   if (!table.Open(*data, wanted, context)) return std::nullopt;
@@ -256,13 +267,19 @@ std::vector<double> LaboratoryTable::RawColumn(const std::string& column, const 
   return values;
 }
 
+std::string LaboratoryTable::UnitOf(const std::string& name) const {
+  if (const dem::ObservableInfo* info = dem::FindObservable(name)) return info->unit;
+  const std::string* stated = FindIn(units_, name);
+  return stated != nullptr ? *stated : "1";
+}
+
 double LaboratoryTable::Factor(const std::string& name) const {
   const double* factor = FindIn(factors_, name);
   return factor != nullptr ? *factor : 1;
 }
 
 bool LaboratoryTable::IsEngineering(const std::string& name) const {
-  return strain_ == Strain::kEngineering && IsStrain(name);
+  return !by_unit_only_ && strain_ == Strain::kEngineering && IsStrain(name);
 }
 
 std::vector<double> LaboratoryTable::ToModel(const std::string& name,
@@ -272,7 +289,7 @@ std::vector<double> LaboratoryTable::ToModel(const std::string& name,
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::isnan(raw[i])) continue;
     if (IsEngineering(name)) values[i] = raw[i] < 1 ? -std::log1p(-raw[i]) : HUGE_VAL;
-    if (IsStrain(name) && !(std::abs(values[i]) <= kLargestStrain)) {
+    if (!by_unit_only_ && IsStrain(name) && !(std::abs(values[i]) <= kLargestStrain)) {
       context.problems().AddIn(
           path_, LineOf(i), ColumnOf(name),
           absl::StrCat("a strain of ", raw[i],

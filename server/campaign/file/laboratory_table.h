@@ -8,20 +8,25 @@
 #include <vector>
 
 #include "server/campaign/file/derived_columns.h"
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 #include "server/campaign/keys/words.h"
 
 namespace calib::campaign {
 
+/// What a table's names may be.
+struct TableNames {
+  bool free = false;          ///< names that no catalogue knows are allowed
+  bool by_unit_only = false;  ///< columns are converted by unit, strains among them
+};
+
 class LaboratoryTable {
  public:
   /// Reads {file, columns, units, strain, sign, zero, offset, formulas} and the keys of
-  /// read_table_format.h. wanted: our names of the columns that will be asked for. free_names:
-  /// names that no catalogue knows are allowed (precomputed runs). Empty after a problem that
-  /// leaves nothing to read.
+  /// read_table_format.h. wanted: our names of the columns that will be asked for. Empty after a
+  /// problem that leaves nothing to read.
   static std::optional<LaboratoryTable> Read(MapReader& experiment,
                                              const std::vector<std::string>& wanted,
-                                             bool free_names, ReadContext& context);
+                                             const TableNames& names, ReadContext& context);
 
   const std::string& path() const { return path_; }
   /// Leaves out the rows in which this column of ours has no number, and says how many there are.
@@ -42,6 +47,8 @@ class LaboratoryTable {
                                 ReadContext& context) const;
   /// What turns a number of the file's column behind one of our names into SI.
   double Factor(const std::string& name) const;
+  /// SI unit of our name: the catalogue's, or that of the unit which the file states; "1".
+  std::string UnitOf(const std::string& name) const;
   /// Engineering strains to logarithmic, ln being that of the deformed over the initial length or
   /// volume and compression positive: e_log = -ln(1 - e). Other observables pass unchanged.
   std::vector<double> ToModel(const std::string& name, const std::vector<double>& raw,
@@ -65,10 +72,12 @@ class LaboratoryTable {
   std::vector<std::size_t> kept_;                             // rows of the table
   std::vector<std::pair<std::string, std::string>> columns_;  // our name, the file's
   std::vector<std::pair<std::string, double>> factors_;       // our name, to SI
+  std::vector<std::pair<std::string, std::string>> units_;    // our name, SI, where stated
   std::vector<std::pair<std::string, double>> signs_;         // our name, 1 or -1
   std::vector<std::pair<std::string, double>> offsets_;       // our name, SI
   std::vector<std::string> from_first_;  // our names, whose first reading is their zero
   Strain strain_ = Strain::kEngineering;
+  bool by_unit_only_ = false;
 };
 
 }  // namespace calib::campaign

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
+#include "server/campaign/file/program/read_told.h"
 #include "server/campaign/file/read_materials.h"
 #include "server/campaign/file/read_measurements.h"
 #include "server/campaign/file/read_meshes.h"
@@ -168,7 +169,7 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
 }
 
 const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experiment& experiment) {
-  if (!campaign.precomputed &&
+  if (!campaign.precomputed && !campaign.program &&
       map.Require("test", "one of " + Listed(map.WordsOf("test"))) == nullptr) {
     return nullptr;
   }
@@ -202,9 +203,20 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   Experiment experiment;
   experiment.name = ReadName(map, context, campaign);
   const dem::TestInfo* test = ReadTest(map, campaign, experiment);
-  if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
+  if (campaign.program) {
+    ReadTold(map, test, campaign, experiment);
+    if (test != nullptr) ReadStressDriven(map, *test, experiment);
+  } else {
+    if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
+    map.Ignore({"settings"});
+    if (map.Has("settings")) {
+      map.Problem("settings", "is what a program (model.command) is told; remove it");
+    }
+  }
   experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
-  if (campaign.precomputed) {
+  if (campaign.program) {
+    experiment.specimen_grains = map.Quantity("specimen_grains");
+  } else if (campaign.precomputed) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseKeys(map, "has no meaning with precomputed runs; remove it");
     map.Ignore({"materials"});
@@ -233,10 +245,12 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
     }
   }
   const MeasurementRules rules{
-      .precomputed = campaign.precomputed.has_value(),
+      .free_names = HasNamesOfItsOwn(campaign, experiment),
+      .by_unit_only = campaign.program.has_value() && test == nullptr,
       .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
       .measured = !RunsRowsOnly(campaign.method)};
-  if (campaign.precomputed || test != nullptr) {
+  const bool wrong_test = test == nullptr && map.Has("test");
+  if (campaign.precomputed || test != nullptr || (campaign.program && !wrong_test)) {
     ReadMeasurements(map, rules, context, experiment);
     map.Finish();
   }  // with an unknown test neither its settings nor its observables can be told from mistakes

@@ -1,7 +1,7 @@
 #pragma once
 // The section `experiments`: one lab test each, with its specimen, protocol and measurements.
 
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 

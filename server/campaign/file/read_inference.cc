@@ -255,6 +255,11 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   }
   stopping.rungs = ReadRungs(*map);
   stopping.exponent = map->Quantity("exponent");
+  if (!stopping.rungs.empty() && campaign.program) {
+    map->Problem("rungs",
+                 "rest and go on, which a program (model.command) cannot: each would begin anew; "
+                 "leave them out");
+  }
   if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
     map->Problem("rungs",
                  "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
@@ -285,6 +290,13 @@ void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
       static_cast<int>(map->Integer("attempts").value_or(campaign.failure.attempts));
   campaign.failure.pause_above =
       map->Quantity("pause_above").value_or(campaign.failure.pause_above);
+  if (const auto at_limit = map->Choice("at_limit")) {
+    if (campaign.program) {
+      campaign.program->limit_diverges = *at_limit == "diverged";
+    } else {
+      map->Problem("at_limit", "is of a program (model.command), whose limits a run can come to");
+    }
+  }
   map->Finish();
 }
 

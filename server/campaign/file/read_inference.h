@@ -1,7 +1,7 @@
 #pragma once
 // How the campaign is inferred and run: noise, inference, early_stopping, failure, budget, seed.
 
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {

@@ -2,7 +2,7 @@
 // What ties the parameters of a campaign together before any data: correlations of their priors and
 // linear constraints between them.
 
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {

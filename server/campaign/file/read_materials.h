@@ -2,7 +2,7 @@
 // Materials of a campaign file: `model.materials` and `model.pairs`, `materials` of an experiment.
 
 #include "dem/registry/catalog.h"
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {

@@ -28,7 +28,7 @@ ControlSpec ReadControl(MapReader& map, const MeasurementRules& rules, const dem
   const std::string usual = test != nullptr ? test->control : "axial_strain";
   const YamlNode* node = map.Find("control");
   if (node == nullptr) {
-    if (!rules.precomputed) {
+    if (!rules.free_names) {
       map.Problem("control",
                   absl::StrCat("is missing; the model is driven along it, e.g. control: ", usual));
     }
@@ -45,7 +45,7 @@ ControlSpec ReadControl(MapReader& map, const MeasurementRules& rules, const dem
   } else {
     control.name = map.Text("control").value_or("");
   }
-  if (!rules.precomputed && test != nullptr && !control.name.empty()) {
+  if (!rules.free_names && test != nullptr && !control.name.empty()) {
     std::vector<std::string> controls = {test->control};
     controls.insert(controls.end(), test->other_controls.begin(), test->other_controls.end());
     if (!test->stress_control.empty()) controls.push_back(test->stress_control);
@@ -96,7 +96,7 @@ bool Comparable(const MapReader& map, const std::string& name, const ControlSpec
   std::string message;
   if (name == control.name) {
     message = "is the control: the model follows it exactly, there is nothing to compare";
-  } else if (!rules.precomputed && test != nullptr &&
+  } else if (!rules.free_names && test != nullptr &&
              std::find(test->observables.begin(), test->observables.end(), name) ==
                  test->observables.end()) {
     message = absl::StrCat("is not an observable of ", test->name, "; ",
@@ -241,14 +241,16 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   for (const ObservableSpec& spec : specs) {
     if (rules.measured) wanted.push_back(spec.name);
   }
-  auto table = LaboratoryTable::Read(experiment_map, wanted, rules.precomputed, context);
+  auto table = LaboratoryTable::Read(experiment_map, wanted,
+                                     {.free = rules.free_names, .by_unit_only = rules.by_unit_only},
+                                     context);
   if (table && !control.name.empty()) {
     experiment.rows_without_control = static_cast<int>(table->KeepRowsWith(control.name, context));
   }
 
   for (const ObservableSpec& spec : specs) {
     if (!Comparable(experiment_map, spec.name, control, rules, test)) continue;
-    if (context.is_new() && !rules.precomputed)
+    if (context.is_new() && !rules.free_names)
       CheckFree(experiment_map, spec.name, control, experiment);
     MeasuredObservable observable{.name = spec.name, .values = {}, .sd = {}};
     const bool given = table && (rules.measured || table->Has(spec.name));
@@ -279,7 +281,7 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   if (context.problems().size() > before) return;
   experiment.control_name = control.name;
   experiment.control_start = StartOf(control.name, experiment);
-  if (test != nullptr && !rules.precomputed) {
+  if (test != nullptr && !rules.free_names) {
     CheckRange(*table, *test, control, experiment.control, context);
   }
   if (context.is_new()) CheckNoiseOf(experiment_map, control, experiment);

@@ -2,13 +2,16 @@
 // The keys `data`, `control` and `observables` of an experiment: from the laboratory's file to
 // readings with errors.
 
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 
 /// What decides how measurements are read.
 struct MeasurementRules {
-  bool precomputed = false;  ///< no model is driven: the control is optional
+  /// Names that no catalogue knows are allowed, and the control is optional: nothing here drives
+  /// the model.
+  bool free_names = false;
+  bool by_unit_only = false;  ///< columns are converted by unit, strains among them
   bool noise_needed =
       true;  ///< false with ess_target, where the readings themselves scale the errors
   /// False with the method table, which infers nothing: an observable need not have been measured.

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "dem/registry/catalog.h"
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 

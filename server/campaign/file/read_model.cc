@@ -1,6 +1,7 @@
 #include "server/campaign/file/read_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -8,9 +9,10 @@
 #include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
 #include "dem/registry/model_parameters.h"
+#include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_materials.h"
-#include "server/campaign/file/read_prior.h"
-#include "server/campaign/file/read_user_effects.h"
+#include "server/campaign/file/shared/read_prior.h"
+#include "server/campaign/file/shared/read_user_effects.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/race.h"
@@ -191,7 +193,7 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
   const YamlNode& node = *parameters.Find(name);
   const std::string path = parameters.PathOf(name);
   CalibratedParameter parameter{.name = name, .unit = "", .prior = {}};
-  if (campaign.precomputed) {
+  if (campaign.precomputed || campaign.program) {
     if (const auto prior = ReadFreePrior(node, path, parameters.problems(), parameter.unit)) {
       parameter.prior = *prior;
     }
@@ -270,13 +272,25 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
   }
 }
 
+// Keys that only a program's model has.
+constexpr std::array kProgramKeys = {"command", "files",      "templates", "keep",    "checkpoint",
+                                     "states",  "persistent", "limits",    "version", "numerics"};
+
 }  // namespace
 
-void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& campaign) {
+void ReadModel(MapReader& campaign_map, ReadContext& context, Campaign& campaign) {
   const YamlNode* node =
       campaign_map.Require("model", "it names contact, effects, density and fixed parameters");
   if (node == nullptr) return;
   MapReader map(*node, campaign_map.PathOf("model"), SectionOf("model"), campaign_map.problems());
+  if (NamesProgram(map)) {
+    ReadProgram(map, context, campaign);
+    return;
+  }
+  for (const char* key : kProgramKeys) {
+    map.Ignore({key});
+    if (map.Has(key)) map.Problem(key, "is of a program as the model; command is missing");
+  }
   if (map.Has("precomputed")) {
     map.Ignore({"precomputed", "contact", "effects", "user_effects", "density", "materials",
                 "pairs", "fixed", "shear_unloading"});  // read with the experiments
@@ -323,7 +337,7 @@ void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
     ReadOne(*parameters, name, campaign);
   }
   parameters->Finish();
-  if (!campaign.precomputed && !campaign.model.contact.empty()) {
+  if (!campaign.precomputed && !campaign.program && !campaign.model.contact.empty()) {
     CheckSources(campaign_map, campaign);
   }
 }

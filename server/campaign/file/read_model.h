@@ -1,15 +1,15 @@
 #pragma once
 // The sections `model` and `parameters` of a campaign file.
 
-#include "server/campaign/file/map_reader.h"
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/file/shared/read_context.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {
 
-/// Reads contact, effects, density and fixed parameters. With precomputed runs none of them is
-/// needed.
-void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& campaign);
+/// Reads contact, effects, density and fixed parameters; with precomputed runs, and with a program
+/// (program/read_program.h), none of them is needed.
+void ReadModel(MapReader& campaign_map, ReadContext& context, Campaign& campaign);
 
 /// Reads the calibrated parameters and their priors, then checks that every parameter of the model
 /// has exactly one source: calibrated, fixed, or the catalogue's default. Call after ReadModel.

@@ -32,7 +32,8 @@ NoiseLaw LawOf(const NoiseSpec& spec) {
           .absolute = spec.absolute};
 }
 
-std::string UnitOf(const std::string& name) {
+std::string UnitOf(const std::string& name, const LaboratoryTable* table) {
+  if (table != nullptr) return table->UnitOf(name);
   const dem::ObservableInfo* info = dem::FindObservable(name);
   return info != nullptr ? info->unit : "1";
 }
@@ -56,12 +57,12 @@ std::optional<std::size_t> ReadingAtZero(const std::vector<double>& raw) {
   return std::nullopt;
 }
 
-std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& name) {
+std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& unit) {
   const std::size_t before = noise.problems().size();
   NoiseSpec spec;
   spec.relative = noise.Quantity("relative");
-  spec.floor = noise.Quantity("floor", UnitOf(name), kNotNegative);
-  spec.absolute = noise.Quantity("absolute", UnitOf(name), kPositive);
+  spec.floor = noise.Quantity("floor", unit, kNotNegative);
+  spec.absolute = noise.Quantity("absolute", unit, kPositive);
   spec.column = noise.Text("column").value_or("");
   spec.covariance = noise.Text("covariance").value_or("");
   const int kinds =
@@ -312,9 +313,10 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
     observable.ess_weight = map.Quantity("weight").value_or(1);
     noise_given = map.Has("noise") || node->kind != YamlNode::Kind::kMap;
     if (auto noise = map.Map("noise")) {
-      const auto spec = ReadSpec(*noise, name);
+      const auto spec = ReadSpec(*noise, UnitOf(name, table));
       observable.correlation_length =
-          noise->Quantity("correlation_length", UnitOf(rules.control), kNotNegative).value_or(0);
+          noise->Quantity("correlation_length", UnitOf(rules.control, table), kNotNegative)
+              .value_or(0);
       noise->Finish();
       if (spec && (spec->relative || spec->absolute)) observable.noise = LawOf(*spec);
       if (spec && noise->Has("correlation_length") && !spec->covariance.empty()) {

@@ -7,9 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
-#include "server/campaign/file/read_user_effects.h"
 #include "server/campaign/file/run_states.h"
 #include "server/campaign/file/run_table.h"
+#include "server/campaign/file/shared/read_user_effects.h"
 #include "server/campaign/file/text/suggestion.h"
 
 namespace calib::campaign {

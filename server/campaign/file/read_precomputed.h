@@ -1,7 +1,7 @@
 #pragma once
 // The key `model.precomputed`: runs that exist already, one table of parameters and one of states.
 
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "dem/particles/packing.h"
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 
 namespace calib::campaign {
 

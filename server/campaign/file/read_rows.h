@@ -1,7 +1,7 @@
 #pragma once
 // Runs given one by one: the rows of a table or a design, and the race of a design.
 
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {

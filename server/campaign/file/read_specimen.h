@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 

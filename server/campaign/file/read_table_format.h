@@ -1,7 +1,7 @@
 #pragma once
 // The keys of `data` that say what form the laboratory's file has.
 
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/file/text/table_layout.h"
 
 namespace calib::campaign {

@@ -79,9 +79,12 @@ Section FailureKeys() {
   return {"failure",
           "failure",
           {
-              {"attempts", Whole(1, 100), "5", "tries of a run whose worker was lost"},
+              {"attempts", Whole(1, 100), "5",
+               "tries of a run whose worker was lost, or whose program failed"},
               {"pause_above", Number("1", kShare), "0.25",
-               "share of diverged samples that pauses the campaign"},
+               "share of diverged and unknown samples that pauses the campaign"},
+              {"at_limit", OneWord({"failed", "diverged"}), "failed",
+               "what a program is that comes to one of `model.limits`"},
           }};
 }
 

@@ -42,21 +42,24 @@ Section ExperimentKeys() {
       {
           {"name", Text(), kRequired, "short word for tables and file names",
            "letters, digits, `_ - . +`; at most 64, the first none of `- . +`"},
-          {"test", OneWord(TestNames()), "required but with `precomputed`",
+          {"test", OneWord(TestNames()), "required but with `precomputed`, `command`",
            "lab test (`calibctl tests`)"},
           {"SETTING", NumberOfCatalogue(), "as `calibctl tests` says",
            "a setting of the test, e.g. `confining_pressure`"},
           {"role", OneWord(kRoleWords), WordOf(kRoleWords, Role::kCalibrate),
            "`validate` is never fitted, reported as held-out error"},
           {"packing", MapOf("packing"), "required where the test needs one", "the specimen"},
-          {"realizations", Whole(1, 1000), "number of files; 1 with a recipe",
-           "packings the samples are spread over"},
+          {"settings", MapOf("told_settings"), "none", "what a program (`command`) is told"},
+          {"realizations", AnyOf({Whole(1, 1000), MapOf("told_realizations")}),
+           "number of files; 1 with a recipe", "packings the samples are spread over",
+           "1 to 1000; with `command` also a map of settings to lists of values"},
           {"specimen_grains", Number("1", {.min = 1}), "as the model",
            "grains of the measured specimen: the more, the less of the scatter of packings it "
            "shares"},
           {"meshes", MapOf("meshes"), "the test's own", "pieces of the apparatus as STL files"},
           {"materials", MapOf("bodies"), "the model's own", "who is of which material"},
-          {"control", AnyOf({Text(), MapOf("control")}), "required but with `precomputed`",
+          {"control", AnyOf({Text(), MapOf("control")}),
+           "required but with `precomputed`, `command`",
            "what drives the loading: the test's control, or what `calibctl tests` allows besides"},
           {"consolidation", MapOf("consolidation"), "the model's friction",
            "how the specimen is compressed"},
@@ -118,6 +121,19 @@ Section Sizes() {
            "log-normal by mass, cut off at two `log_sd` to either side"},
           {"log_sd", Number("1", kShare), "required with `median`", "that of ln size"},
       }};
+}
+
+Section ToldSettings() {
+  return {"told_settings",
+          "experiments[].settings",
+          {{"NAME", AnyOf({Text(), ListOf(Text())}), "",
+            "any; quantities are sent in SI, the name of a file of `model.files` is that file"}}};
+}
+
+Section ToldRealizations() {
+  return {"told_realizations",
+          "experiments[].realizations",
+          {{"NAME", ListOf(Text()), "", "a setting, one value per realization"}}};
 }
 
 Section MeshesKeys() {
@@ -200,9 +216,9 @@ Section StagingKeys() {
 }  // namespace
 
 std::vector<Section> SectionsOfExperiments() {
-  return {ExperimentKeys(),    PackingKeys(), Recipe(), Sizes(),       MeshesKeys(),
-          MeshKeys(),          Bodies(),      Shares(), ControlKeys(), Consolidation(),
-          InitialStressKeys(), StagingKeys()};
+  return {ExperimentKeys(), ToldSettings(),  ToldRealizations(),  PackingKeys(), Recipe(),
+          Sizes(),          MeshesKeys(),    MeshKeys(),          Bodies(),      Shares(),
+          ControlKeys(),    Consolidation(), InitialStressKeys(), StagingKeys()};
 }
 
 }  // namespace calib::campaign

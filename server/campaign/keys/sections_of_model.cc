@@ -47,24 +47,45 @@ std::vector<std::string> EffectNames() {
 }
 
 Section Model() {
-  return {"model",
-          "model",
-          {
-              {"contact", OneWord(ContactNames()), "required but with `precomputed`",
-               "contact law (`calibctl contacts`)"},
-              {"effects", OneOrMore(AnyOf({OneWord(EffectNames()), Text()})), "none",
-               "added physics", "names of `calibctl effects`, or `none`"},
-              {"density", Number("kg/m^3", kPositive), "2650 kg/m^3", "of the grains"},
-              {"fixed", MapOf("fixed"), "", "parameters that are not calibrated"},
-              {"shear_unloading", OneWord(kShearUnloadingWords), "as_published",
-               "as the normal force falls, the elastic shear force stays, and closed cycles can "
-               "give work; or falls with its stiffness, and none does"},
-              {"user_effects", MapOf("user_effects"), "none", "effects written as formulas"},
-              {"materials", MapOf("materials"), "none", "materials besides the model's own"},
-              {"pairs", MapOf("pairs"), "none", "values of two materials that touch"},
-              {"precomputed", MapOf("precomputed"), "none",
-               "runs that exist already; takes the place of all the others"},
-          }};
+  return {
+      "model",
+      "model",
+      {
+          {"contact", OneWord(ContactNames()), "required but with `precomputed`, `command`",
+           "contact law (`calibctl contacts`)"},
+          {"effects",
+           AnyOf({OneOrMore(AnyOf({OneWord(EffectNames()), Text()})), MapOf("held_effects")}),
+           "none", "added physics; with `command` what the program may switch on",
+           "names of `calibctl effects`, or `none`; with `command` a map as of "
+           "`model.precomputed.effects`"},
+          {"density", Number("kg/m^3", kPositive), "2650 kg/m^3", "of the grains"},
+          {"fixed", MapOf("fixed"), "", "parameters that are not calibrated"},
+          {"shear_unloading", OneWord(kShearUnloadingWords), "as_published",
+           "as the normal force falls, the elastic shear force stays, and closed cycles can "
+           "give work; or falls with its stiffness, and none does"},
+          {"user_effects", MapOf("user_effects"), "none", "effects written as formulas"},
+          {"materials", MapOf("materials"), "none", "materials besides the model's own"},
+          {"pairs", MapOf("pairs"), "none", "values of two materials that touch"},
+          {"precomputed", MapOf("precomputed"), "none",
+           "runs that exist already; takes the place of all the others"},
+          {"command", OneOrMore(Text()), "none",
+           "a program of yours as the model, with its arguments; takes the place of the DEM",
+           "a list of texts; `{scratch}`, `{threads}`, `{seed}`, `{PARAMETER}`, `{SETTING}` "
+           "are replaced"},
+          {"files", OneOrMore(Text()), "none",
+           "files and folders that it needs, brought into its scratch folder"},
+          {"templates", OneOrMore(Text()), "none", "the same, with names replaced in the text"},
+          {"keep", OneOrMore(Text()), "none", "files of the scratch folder that stay with the run"},
+          {"checkpoint", TrueOrFalse(), "false", "it understands checkpoints"},
+          {"states", MapOf("program_states"), "standard output",
+           "a table that grows, read in its place"},
+          {"persistent", TrueOrFalse(), "false",
+           "one process per slot, a request per line on standard input"},
+          {"limits", MapOf("program_limits"), "none", "what a run may take"},
+          {"version", Text(), "", "part of what a run is, for what the files do not show"},
+          {"numerics", MapOf("program_numerics"), "none",
+           "settings of the code that should not matter"},
+      }};
 }
 
 Section Fixed() {
@@ -121,7 +142,8 @@ Section PriorKeys() {
                "mean of a normal; the *median*, in units, of a log_normal"},
               {"sd", NumberOfCatalogue(), "normal, log_normal: required",
                "standard deviation; of a log_normal that of ln x, a plain number"},
-              {"unit", Text(), "that of the numbers", "of the numbers; with `precomputed` only"},
+              {"unit", Text(), "that of the numbers",
+               "of the numbers; with `precomputed`, `command` only"},
           }};
 }
 
@@ -166,11 +188,60 @@ Section HeldEffect() {
           }};
 }
 
+Section ProgramStates() {
+  return {"program_states",
+          "model.states",
+          {
+              {"file", Text(), kRequired, "name in the scratch folder"},
+              {"columns", MapOf("columns"), "names that agree", "our name: column of the table"},
+              {"units", MapOf("units"), "SI", "of the columns"},
+          }};
+}
+
+Section ProgramLimitKeys() {
+  return {"program_limits",
+          "model.limits",
+          {
+              {"wall", Number("s", kPositive), "none", "time of a run"},
+              {"memory", Text(), "none", "resident memory of all its processes, e.g. 4 GB"},
+              {"disk", Text(), "none", "size of its scratch folder, e.g. 10 GB"},
+              {"silence", Number("s", kPositive), "none", "time without a state"},
+          }};
+}
+
+Section ProgramNumericsKeys() {
+  return {"program_numerics",
+          "model.numerics",
+          {{"NAME", MapOf("program_number"), "", "a parameter of the program"}}};
+}
+
+Section ProgramNumber() {
+  return {"program_number",
+          "model.numerics.NAME",
+          {
+              {"null", Number("1"), kRequired, "as it is run"},
+              {"sd", Number("1", kPositive), kRequired, "of what else it might be"},
+          }};
+}
+
 }  // namespace
 
 std::vector<Section> SectionsOfModel() {
-  return {Model(), Fixed(), Parameters(),      PriorKeys(),   Materials(), Material(),
-          Pairs(), Pair(),  PrecomputedKeys(), HeldEffects(), HeldEffect()};
+  return {Model(),
+          Fixed(),
+          Parameters(),
+          PriorKeys(),
+          Materials(),
+          Material(),
+          Pairs(),
+          Pair(),
+          PrecomputedKeys(),
+          HeldEffects(),
+          HeldEffect(),
+          ProgramStates(),
+          ProgramLimitKeys(),
+          ProgramNumericsKeys(),
+          ProgramNumber()};
 }
 
 }  // namespace calib::campaign

@@ -188,6 +188,10 @@ inference::Proposal FirstProposalOf(const Campaign& campaign) {
   return proposal;
 }
 
+bool HasNamesOfItsOwn(const Campaign& campaign, const Experiment& experiment) {
+  return campaign.precomputed || (campaign.program && experiment.test.empty());
+}
+
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
                            const RunOf& run) {
   dem::Scenario scenario;

@@ -16,6 +16,7 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
 #include "inference/tmcmc/tmcmc.h"
+#include "server/campaign/model/program.h"
 #include "server/campaign/model/words.h"
 
 namespace calib::campaign {
@@ -77,7 +78,13 @@ struct PackingLike {
 /// The specimen of a test that makes its bodies from its settings.
 struct NoPacking {};
 
-using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking, PackingLike>;
+/// What one realization tells a program otherwise than the experiment's settings do.
+struct ProgramSpecimen {
+  ProgramSettings settings{};
+};
+
+using Specimen =
+    std::variant<PackingFile, dem::PackingRecipe, NoPacking, PackingLike, ProgramSpecimen>;
 
 /// An STL file in place of a piece of the test's boundary.
 struct MeshFile {
@@ -89,7 +96,7 @@ struct MeshFile {
 
 struct Experiment {
   std::string name;
-  std::string test;  ///< may be empty when precomputed
+  std::string test;  ///< may be empty when precomputed, or run by a program
   std::map<std::string, double> settings;
   Role role = Role::kCalibrate;
   /// Realizations: sample i uses specimen i mod size. A PackingLike stands behind all files. Empty
@@ -98,6 +105,7 @@ struct Experiment {
   /// Number of grains of the specimen that was measured; empty: unknown, taken for as few as the
   /// model's.
   std::optional<double> specimen_grains;
+  ProgramSettings told;                    ///< to a program; nothing else is
   std::map<std::string, MeshFile> meshes;  ///< by name of dem::TestInfo::meshes
   dem::MaterialUse materials;
   dem::Consolidation consolidation;
@@ -211,9 +219,11 @@ struct EarlyStopping {
 };
 /// What happens when runs fail or diverge.
 struct Failure {
-  int attempts = 5;  ///< failed ones of one evaluation after which the campaign is paused
-  double pause_above =
-      0.25;  ///< share of diverged samples of an iteration above which it is paused
+  /// Failed ones of one evaluation after which the campaign is paused, or with a program the
+  /// sample is set aside as unknown.
+  int attempts = 5;
+  /// Share of diverged and unknown samples of an iteration above which it is paused.
+  double pause_above = 0.25;
 };
 /// No iteration begins that could exceed one of these; empty: no bound.
 struct Budget {
@@ -225,6 +235,8 @@ struct Campaign {
   std::string name;
   dem::Model model;  ///< parameters: the fixed ones
   std::optional<Precomputed> precomputed;
+  /// In place of the DEM; its effects are declared in model.user_effects, without a formula.
+  std::optional<Program> program;
   std::vector<CalibratedParameter> parameters;
   /// Where correlations or constraints tie them; their priors are its marginals.
   std::optional<inference::JointPrior> tied_prior;
@@ -296,6 +308,10 @@ int StreamOf(const Campaign& campaign, int sample);
 
 /// What first_proposal says, in the coordinates of the priors; the prior alone without it.
 inference::Proposal FirstProposalOf(const Campaign& campaign);
+
+/// Whether observables and readings are what the campaign's tables say, whatever the catalogue
+/// has: runs made elsewhere, and a program's in a test that has no name here.
+bool HasNamesOfItsOwn(const Campaign& campaign, const Experiment& experiment);
 
 /// What one run of a campaign's experiments is made with.
 struct RunOf {

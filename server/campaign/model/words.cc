@@ -27,7 +27,7 @@ const char* ToString(EvaluationStatus status) { return WordOf(kEvaluationStatusW
 
 bool IsTerminal(EvaluationStatus status) {
   return status == EvaluationStatus::kFinished || status == EvaluationStatus::kDiverged ||
-         status == EvaluationStatus::kStoppedEarly;
+         status == EvaluationStatus::kStoppedEarly || status == EvaluationStatus::kUnknown;
 }
 
 const char* ToString(SamplePurpose purpose) { return WordOf(kSamplePurposeWords, purpose); }

@@ -62,7 +62,16 @@ inline constexpr std::array kPhaseWords = {
 const char* ToString(Phase phase);
 
 /// Where one evaluation is, and in messages one sample, which is where its worst evaluation is.
-enum class EvaluationStatus { kWaiting, kRunning, kFinished, kDiverged, kStoppedEarly, kFailed };
+/// kUnknown: a program failed on it as often as it may.
+enum class EvaluationStatus {
+  kWaiting,
+  kRunning,
+  kFinished,
+  kDiverged,
+  kStoppedEarly,
+  kFailed,
+  kUnknown
+};
 inline constexpr std::array kEvaluationStatusWords = {
     Word{EvaluationStatus::kWaiting, "waiting"},
     Word{EvaluationStatus::kRunning, "running"},
@@ -70,6 +79,7 @@ inline constexpr std::array kEvaluationStatusWords = {
     Word{EvaluationStatus::kDiverged, "diverged"},
     Word{EvaluationStatus::kStoppedEarly, "stopped_early"},
     Word{EvaluationStatus::kFailed, "failed"},
+    Word{EvaluationStatus::kUnknown, "unknown"},
 };
 const char* ToString(EvaluationStatus status);
 /// True when nothing more is to be run for an evaluation in this status.

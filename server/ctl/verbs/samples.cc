@@ -1,4 +1,5 @@
 #include <iostream>
+#include <sstream>
 #include <string>
 
 #include "calib/return_if_error.h"
@@ -47,6 +48,14 @@ absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& o
     table.AddRow(std::move(row));
   }
   std::cout << table.ToString();
+  for (const v1::Sample& s : samples) {
+    if (s.words().empty()) continue;
+    std::cout << "\nsample " << s.index() << ", " << s.status()
+              << (s.reason().empty() ? "" : ": " + s.reason())
+              << "\n  its program printed last on standard error:\n";
+    std::istringstream lines(s.words());
+    for (std::string line; std::getline(lines, line);) std::cout << "  | " << line << "\n";
+  }
   return kDone;
 }
 

@@ -1,4 +1,5 @@
 #include <iostream>
+#include <set>
 #include <string>
 
 #include "calib/return_if_error.h"
@@ -23,6 +24,11 @@ struct StatesOptions {
 void Print(const std::string& experiment, const report::StateHistory& history) {
   std::vector<std::string> columns = {"step"};
   columns.insert(columns.end(), history.observables.begin(), history.observables.end());
+  std::set<std::string> others;  // that a program told besides
+  for (const v1::State& state : history.states) {
+    for (const auto& [name, value] : state.others()) others.insert(name);
+  }
+  columns.insert(columns.end(), others.begin(), others.end());
   report::TextTable table(columns);
   for (const v1::State& state : history.states) {
     std::vector<std::string> row = {std::to_string(state.load_step())};
@@ -31,6 +37,10 @@ void Print(const std::string& experiment, const report::StateHistory& history) {
       const dem::ObservableInfo* info = dem::FindObservable(name);
       row.push_back(
           report::NumberWithUnit(state.values(k), name, info != nullptr ? info->unit : "1"));
+    }
+    for (const std::string& name : others) {
+      const auto told = state.others().find(name);
+      row.push_back(told == state.others().end() ? "" : report::Number(told->second, 5));
     }
     table.AddRow(std::move(row));
   }

@@ -50,6 +50,26 @@ std::string Shown(const campaign::ExperimentSummary& summary) {
 
 void Declare(OptionList& list, ValidateOptions& options) { list.CampaignFile(options.file); }
 
+// What a program as the model needs of a node, and what is not limited.
+std::string ProgramText(const campaign::Program& program) {
+  std::string command;
+  for (const std::string& part : program.command) command += (command.empty() ? "" : " ") + part;
+  std::string text = report::Wrapped(
+      absl::StrCat(
+          "The model is a program: ", command, ", with ", program.files.size(),
+          " file(s). Workers run it that were started with --allow-command ",
+          program.command.front().find('/') == std::string::npos ? program.command.front() : "'*'",
+          "; `calibctl simulate` is the dry run."),
+      "  ", "  ");
+  if (!program.limits.wall && !program.limits.silence) {
+    text += report::Wrapped(
+        "No time is limited: a run that hangs keeps its slot until somebody stops it; write "
+        "model.limits: {silence: 20 min}.",
+        "! ", "  ");
+  }
+  return text;
+}
+
 absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions& options) {
   const auto source = ReadSourceFiles(options.file, std::nullopt, common.json);
   if (!source) return kBadInput;
@@ -83,6 +103,7 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
     std::cout << campaign.samples << " samples in each of at most " << campaign.max_iterations
               << " iteration(s).\n";
   }
+  if (campaign.program) std::cout << ProgramText(*campaign.program);
   for (const std::string& note : notes) std::cout << report::Wrapped(note, "  ", "  ");
   for (const campaign::Warning& warning : source->outcome.warnings) {
     std::cout << report::Wrapped(campaign::Sentence(warning), "! ", "  ");

@@ -47,6 +47,7 @@ Json Status(const v1::CampaignStatus& s) {
           {"samples_resting", s.samples_resting()},
           {"samples_stopped_early", s.samples_stopped_early()},
           {"samples_diverged", s.samples_diverged()},
+          {"samples_unknown", s.samples_unknown()},
           {"effective_sample_size", PositiveOrNull(s.effective_sample_size())},
           {"best_misfit", PositiveOrNull(s.best_misfit())},
           {"states_per_second", messages::IsOver(s) ? Json(nullptr) : Json(s.states_per_second())},
@@ -60,6 +61,7 @@ Json Status(const v1::CampaignStatus& s) {
           {"purpose", s.purpose().empty() ? Json(nullptr) : Json(s.purpose())},
           {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())},
           {"problem", s.problem().empty() ? Json(nullptr) : Json(s.problem())},
+          {"nobody_may_run_it", s.nobody_may().empty() ? Json(nullptr) : Json(s.nobody_may())},
           {"server_waits", s.server_waits().empty() ? Json(nullptr) : Json(s.server_waits())}};
 }
 
@@ -193,6 +195,8 @@ Json PosteriorFields(const v1::Posterior& p,
           {"model_evaluations", p.model_evaluations()},
           {"stopped_early", p.stopped_early()},
           {"stated_loss", p.stated_loss()},
+          {"unknown", p.unknown()},
+          {"unknown_mass", p.unknown() > 0 ? Json(p.unknown_mass()) : Json(0)},
           {"audited", p.audited()},
           {"audited_bound", p.has_audited_bound() ? Json(p.audited_bound()) : Json(nullptr)},
           {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
@@ -501,6 +505,7 @@ std::string SamplesJson(const std::string& campaign,
                     {"weight", s.weight()},
                     {"log_likelihood", s.log_likelihood()},
                     {"attempts", s.attempts()},
+                    {"words", s.words().empty() ? Json(nullptr) : Json(s.words())},
                     {"purpose", s.purpose()}});
   }
   return Dump({{"campaign", campaign}, {"units", units}, {"samples", list}});
@@ -517,6 +522,7 @@ std::string StatesJson(const std::string& campaign, int sample,
         const auto index = static_cast<std::size_t>(k);
         if (index < history.observables.size()) row[history.observables[index]] = state.values(k);
       }
+      for (const auto& [other, value] : state.others()) row[other] = value;
       states.push_back(std::move(row));
     }
     experiments.push_back({{"experiment", name}, {"states", states}});
@@ -551,17 +557,20 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
   for (const v1::WorkerInfo& w : workers) {
     Json running = Json::array();
     for (const std::string& what : w.running()) running.push_back(what);
-    list.push_back({{"name", w.name()},
-                    {"slots", w.slots()},
-                    {"busy", w.busy()},
-                    {"contact_updates_per_second", w.contact_updates_per_second()},
-                    {"cpu", w.cpu()},
-                    {"draining", w.draining()},
-                    {"connected", w.connected()},
-                    {"left", w.left()},
-                    {"seconds_since_heard", w.seconds_since_heard()},
-                    {"running", running},
-                    {"engine_version", w.engine_version()}});
+    list.push_back(
+        {{"name", w.name()},
+         {"slots", w.slots()},
+         {"threads", w.threads()},
+         {"programs", std::vector<std::string>(w.programs().begin(), w.programs().end())},
+         {"busy", w.busy()},
+         {"contact_updates_per_second", w.contact_updates_per_second()},
+         {"cpu", w.cpu()},
+         {"draining", w.draining()},
+         {"connected", w.connected()},
+         {"left", w.left()},
+         {"seconds_since_heard", w.seconds_since_heard()},
+         {"running", running},
+         {"engine_version", w.engine_version()}});
   }
   return Dump(list);
 }

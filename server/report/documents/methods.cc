@@ -61,6 +61,15 @@ std::string ModelSentence(const campaign::Campaign& campaign, Citations& cited) 
     return fmt::format("The model was known by {} runs made beforehand.",
                        campaign.precomputed->parameters.rows());
   }
+  if (campaign.program) {
+    const campaign::Program& program = *campaign.program;
+    std::string text = fmt::format("Simulated by {}", fmt::join(program.command, " "));
+    if (!program.version.empty()) text += ", version " + program.version;
+    if (!campaign.model.effects.empty()) {
+      text += fmt::format(", with {}", fmt::join(campaign.model.effects, ", "));
+    }
+    return text + ".";
+  }
   std::string text = "Simulated by the discrete element method" +
                      cited.Cite(
                          "Cundall PA, Strack ODL (1979) A discrete numerical model for "

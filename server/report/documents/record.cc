@@ -44,7 +44,21 @@ std::string SpecimenInWords(const campaign::Experiment& experiment) {
     return fmt::format("{} generated packing(s) of {} grains, porosity {}",
                        experiment.specimens.size(), recipe->particles, Number(recipe->porosity, 3));
   }
+  if (std::holds_alternative<campaign::ProgramSpecimen>(experiment.specimens.front())) {
+    return fmt::format("{} realization(s)", experiment.specimens.size());
+  }
   return "bodies by the test's settings";
+}
+
+// A program, and by what its files and version are known.
+std::string ProgramInWords(const campaign::Program& program) {
+  std::string text = fmt::format("{}", fmt::join(program.command, " "));
+  if (!program.version.empty()) text += ", version " + program.version;
+  constexpr std::size_t kShown = 12;  // of a digest: tells files apart
+  for (const campaign::ProgramFile& file : program.files) {
+    text += fmt::format("; {} {}", file.name, file.digest.substr(0, kShown));
+  }
+  return text;
 }
 
 // What early stopping saved is in the effort; this says what it may have lost.
@@ -71,6 +85,9 @@ Json Entries(const CampaignView& view) {
   add("submitted", DateForPeople(view.status.created_unix_ms()));
   if (campaign.precomputed) {
     add("model", "runs made elsewhere");
+  } else if (campaign.program) {
+    add("model", ProgramInWords(*campaign.program));
+    if (!campaign.model.effects.empty()) add("effects", NamesOf(campaign.model.effects));
   } else {
     add("contact law", NameForPeople(campaign.model.contact));
     add("shear at unloading", NameForPeople(campaign::WordOf(campaign::kShearUnloadingWords,

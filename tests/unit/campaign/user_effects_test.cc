@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/campaign/file/derive.h"
-#include "server/campaign/file/formula_units.h"
+#include "server/campaign/file/shared/formula_units.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

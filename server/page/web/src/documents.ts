@@ -18,6 +18,7 @@ export interface Status {
   samples_resting: number;
   samples_stopped_early: number;
   samples_diverged: number;
+  samples_unknown: number;
   effective_sample_size: Maybe;
   best_misfit: Maybe;
   eta_seconds: Maybe;
@@ -31,6 +32,7 @@ export interface Status {
   purpose: string | null;
   effects: string[];
   problem: string | null;
+  nobody_may_run_it: string | null;
   server_waits: string | null;
 }
 

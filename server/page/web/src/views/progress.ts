@@ -14,12 +14,13 @@ interface Part {
 }
 
 function partsOf(s: Status): Part[] {
-  const plain = s.samples_done - s.samples_stopped_early - s.samples_diverged;
+  const plain = s.samples_done - s.samples_stopped_early - s.samples_diverged - s.samples_unknown;
   const waiting = s.samples - s.samples_done - s.samples_running - s.samples_resting;
   return [
     { name: "done", count: Math.max(0, plain), className: "done" },
     { name: "stopped early", count: s.samples_stopped_early, className: "stopped" },
     { name: "diverged", count: s.samples_diverged, className: "diverged" },
+    { name: "unknown", count: s.samples_unknown, className: "diverged" },
     { name: "running", count: s.samples_running, className: "running" },
     { name: "resting", count: s.samples_resting, className: "resting" },
     { name: "waiting", count: Math.max(0, waiting), className: "waiting" },
@@ -69,7 +70,7 @@ export const progressView: View = (root, context) => {
       replace(now, absent(answer, "The campaign's progress."));
       return;
     }
-    const problems = [shown.problem, shown.server_waits, ...shown.warnings].filter((text): text is string => text !== null);
+    const problems = [shown.problem, shown.nobody_may_run_it === null ? null : `Nothing runs: ${shown.nobody_may_run_it}.`, shown.server_waits, ...shown.warnings].filter((text): text is string => text !== null);
     const nodes = valueOf<Lineage>(lineage);
     keepSaid(problems, () => warnings(problems));
     keepNext(shown.next_command ?? null, () =>

@@ -1,4 +1,4 @@
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 
 #include <algorithm>
 #include <cassert>

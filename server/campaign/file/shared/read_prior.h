@@ -5,7 +5,7 @@
 #include <string>
 
 #include "inference/prior/prior.h"
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
 
 namespace calib::campaign {
 

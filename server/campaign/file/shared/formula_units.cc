@@ -1,4 +1,4 @@
-#include "server/campaign/file/formula_units.h"
+#include "server/campaign/file/shared/formula_units.h"
 
 #include <algorithm>
 #include <cctype>

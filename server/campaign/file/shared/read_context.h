@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "server/campaign/checks/warning.h"
-#include "server/campaign/file/campaign_file.h"
-#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/file/shared/reading.h"
 #include "server/campaign/file/text/data_file.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::campaign {
 
@@ -35,6 +36,9 @@ class ReadContext {
   /// once.
   const std::string* ReadNamedFile(const MapReader& map, const std::string& key,
                                    const std::string& path);
+
+  /// Whether there is such a file; it does not become one of the campaign's.
+  bool IsFile(const std::string& path) const { return reader_(path).ok(); }
 
   /// Moves what was found in a table into the problem list.
   void AddTableProblems(const std::string& path, const std::vector<TableProblem>& found);

@@ -1,4 +1,4 @@
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/read_context.h"
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/file/text/suggestion.h"
@@ -15,7 +15,8 @@ const std::string* ReadContext::ReadNamedFile(const MapReader& map, const std::s
       known->second = *std::move(content);
       files_.push_back(path);
     } else {
-      map.Problem(key, absl::StrCat("cannot read ", Quoted(path), ": ", content.status().message(),
+      const std::string plain = path.ends_with('/') ? path.substr(0, path.size() - 1) : path;
+      map.Problem(key, absl::StrCat("cannot read ", Quoted(plain), ": ", content.status().message(),
                                     "; relative paths start at the folder of the campaign file"));
     }
   }

@@ -1,4 +1,4 @@
-#include "server/campaign/file/read_user_effects.h"
+#include "server/campaign/file/shared/read_user_effects.h"
 
 #include <algorithm>
 #include <array>
@@ -15,8 +15,8 @@
 #include "dem/formula/user_effect.h"
 #include "dem/registry/declared_effects.h"
 #include "inference/prior/prior.h"
-#include "server/campaign/file/formula_units.h"
-#include "server/campaign/file/read_prior.h"
+#include "server/campaign/file/shared/formula_units.h"
+#include "server/campaign/file/shared/read_prior.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/keys/words.h"
 

@@ -1,4 +1,4 @@
-#include "server/campaign/file/read_prior.h"
+#include "server/campaign/file/shared/read_prior.h"
 
 #include <array>
 #include <cmath>

@@ -3,8 +3,8 @@
 // formulas, and the parameters of any.
 
 #include "dem/model/scenario.h"
-#include "server/campaign/file/map_reader.h"
-#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/file/shared/read_context.h"
 
 namespace calib::campaign {
 
