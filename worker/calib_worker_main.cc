@@ -18,6 +18,8 @@
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
 #include "worker/once.h"
+#include "worker/program/scratch.h"
+#include "worker/program_once.h"
 #include "worker/throughput.h"
 #include "worker/worker.h"
 
@@ -71,6 +73,7 @@ int main(int argc, char** argv) {
       "Runs model evaluations for a calibd server, or one of them without a server (--once)."};
   calib::worker::WorkerOptions options;
   calib::worker::OnceOptions once;
+  calib::worker::ProgramOnceOptions program_once;
   int parent = -1;
   double checkpoints_gib = 4;
   options.slots = 0;
@@ -101,6 +104,13 @@ int main(int argc, char** argv) {
   app.add_option("--checkpoints-gib", checkpoints_gib, "its size at most")
       ->check(CLI::Range(kFewestGib, kMostGib))
       ->capture_default_str();
+  app.add_option("--allow-command", options.allowed_commands,
+                 "programs that campaigns may run here as their model (names, looked for on PATH "
+                 "now, or paths; *: any, which programs that a campaign brings along need). An "
+                 "interpreter, as python3 or sh, runs whatever a campaign brings")
+      ->allow_extra_args();
+  app.add_option("--scratch", options.scratch,
+                 "folder below which such programs run, each in one of its own [$TMPDIR or /tmp]");
   app.add_option("--exit-with-parent", parent,
                  "end when the parent process, of this id (0: whichever), ends");
   auto* spec =
@@ -109,7 +119,17 @@ int main(int argc, char** argv) {
   app.add_option("--mesh", once.meshes, "STL file of --once; may be repeated")
       ->needs(spec)
       ->allow_extra_args(false);
-  app.add_option("-o,--output", once.output, "CSV file of --once [standard output]")->needs(spec);
+  auto* run = app.add_option("--once-program", program_once.run,
+                             "run this ProgramRun (JSON or binary), of any program, and leave")
+                  ->excludes(spec);
+  app.add_option("--files", program_once.files,
+                 "folder with the files of --once-program, each under its SHA-256")
+      ->needs(run);
+  app.add_option("--report", program_once.report,
+                 "file for what the run of --once-program was like, JSON")
+      ->needs(run);
+  app.add_option("-o,--output", once.output,
+                 "CSV file of --once, --once-program [standard output]");
   app.add_option("--vtk", once.vtk, "folder for the grains after each load step of --once")
       ->needs(spec);
   app.add_option("--load-step", once.load_step, "--once ends there and draws no other")
@@ -118,14 +138,14 @@ int main(int argc, char** argv) {
   app.add_option("--checkpoint", once.checkpoint,
                  "file to go on from after an interruption, renewed after each load step of --once")
       ->needs(spec);
-  server->excludes(spec);
+  server->excludes(spec)->excludes(run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  if (once.spec.empty() && options.server.empty()) {
-    std::cerr << "either --server HOST:PORT or --once SPEC is needed\n";
+  if (once.spec.empty() && program_once.run.empty() && options.server.empty()) {
+    std::cerr << "either --server HOST:PORT, --once SPEC or --once-program RUN is needed\n";
     return 2;
   }
   if (parent >= 0 && !ExitWithParent(parent)) {
@@ -133,6 +153,14 @@ int main(int argc, char** argv) {
   }
   if (!once.spec.empty()) {
     return calib::worker::RunOnce(once, std::cerr);
+  }
+  if (options.scratch.empty()) {
+    options.scratch = calib::worker::DefaultScratchRoot("worker");
+  }
+  if (!program_once.run.empty()) {
+    program_once.output = once.output;
+    program_once.scratch = options.scratch;
+    return calib::worker::RunProgramOnce(program_once, std::cerr);
   }
   spdlog::set_default_logger(spdlog::stderr_logger_mt("calib-worker"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");

@@ -14,32 +14,45 @@ constexpr std::int64_t kStatesPerBatch = 1000;
 
 }  // namespace
 
-HeldAttempt::HeldAttempt(const v1::Lease& lease) : HeldAttempt(lease.attempt(), lease.spec()) {
-  if (!lease.run().empty()) {
+HeldAttempt::HeldAttempt(v1::Lease lease) : lease_(std::move(lease)) {
+  if (!lease_.run().empty()) {
     resting_ =
-        RestingRun{.run = lease.run(),
-                   .rest_after = lease.has_rest_after() ? std::optional<int>(lease.rest_after())
-                                                        : std::nullopt};
+        RestingRun{.run = lease_.run(),
+                   .rest_after = lease_.has_rest_after() ? std::optional<int>(lease_.rest_after())
+                                                         : std::nullopt};
   }
 }
 
-void HeldAttempt::Run(Specimens& specimens, const Checkpoints* checkpoints,
-                      std::function<void(const dem::State&)> on_state,
+v1::Finished HeldAttempt::RunDem(Specimens& specimens, const Checkpoints* checkpoints,
+                                 const std::function<void(v1::State)>& on_state,
+                                 std::stop_token stop) const {
+  const dem::StateSink sink = [&on_state](const dem::State& state) {
+    v1::State message;
+    message.set_load_step(state.load_step);
+    message.mutable_values()->Add(state.values.begin(), state.values.end());
+    on_state(std::move(message));
+  };
+  return resting_.has_value()
+             ? EvaluateToRung(lease_.spec(), *resting_, checkpoints, specimens, sink, stop)
+             : Evaluate(lease_.spec(), specimens, sink, stop);
+}
+
+void HeldAttempt::Run(Specimens& specimens, Programs& programs, const Checkpoints* checkpoints,
+                      std::function<void(v1::State)> on_state,
                       std::function<void(v1::Finished)> on_end) {
-  thread_ = std::jthread([this, &specimens, checkpoints, on_state = std::move(on_state),
+  thread_ = std::jthread([this, &specimens, &programs, checkpoints, on_state = std::move(on_state),
                           on_end = std::move(on_end)](std::stop_token stop) {
-    v1::Finished finished = resting_.has_value() ? EvaluateToRung(spec_, *resting_, checkpoints,
-                                                                  specimens, on_state, stop)
-                                                 : Evaluate(spec_, specimens, on_state, stop);
-    finished.set_attempt(id_);
+    v1::Finished finished =
+        lease_.has_program() ? programs.Evaluate(lease_.program(), lease_.attempt(), on_state, stop)
+                             : RunDem(specimens, checkpoints, on_state, stop);
+    finished.set_attempt(lease_.attempt());
     on_end(std::move(finished));
   });
 }
 
-void HeldAttempt::AddState(const dem::State& state) {
-  v1::State& message = kept_.emplace_back();
-  message.set_load_step(state.load_step);
-  message.mutable_values()->Add(state.values.begin(), state.values.end());
+void HeldAttempt::AddState(v1::State state) {
+  rpc::FitTexts(state);  // the names may be a program's
+  kept_.push_back(std::move(state));
 }
 
 void HeldAttempt::AddEnd(v1::Finished finished) {
@@ -52,7 +65,7 @@ std::vector<v1::WorkerMessage> HeldAttempt::TakeUnsent() {
   const std::int64_t end = first_ + static_cast<std::int64_t>(kept_.size());
   while (next_ < end) {
     v1::StateBatch& batch = *messages.emplace_back().mutable_states();
-    batch.set_attempt(id_);
+    batch.set_attempt(lease_.attempt());
     batch.set_first(next_);
     const std::int64_t stop = std::min(end, next_ + kStatesPerBatch);
     for (; next_ < stop; ++next_) {

@@ -5,13 +5,13 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "calib/v1/worker.pb.h"
-#include "dem/model/scenario.h"
-#include "dem/model/state.h"
+#include "worker/program/programs.h"
 #include "worker/resting_run.h"
 #include "worker/specimens.h"
 
@@ -21,21 +21,19 @@ namespace calib::worker {
 /// simulation runs on a thread of its own that only calls the two functions given to Run().
 class HeldAttempt {
  public:
-  HeldAttempt(std::int64_t id, v1::AttemptSpec spec) : id_(id), spec_(std::move(spec)) {}
-  explicit HeldAttempt(const v1::Lease& lease);
+  explicit HeldAttempt(v1::Lease lease);
 
-  /// Starts the simulation. on_state and on_end are called on its thread. checkpoints: outlive it;
-  /// nullptr: none are kept.
-  void Run(Specimens& specimens, const Checkpoints* checkpoints,
-           std::function<void(const dem::State&)> on_state,
-           std::function<void(v1::Finished)> on_end);
+  /// Starts the run, of the DEM or of a program, as the lease has it. on_state and on_end are
+  /// called on its thread. Everything outlives it; checkpoints may be nullptr: none are kept.
+  void Run(Specimens& specimens, Programs& programs, const Checkpoints* checkpoints,
+           std::function<void(v1::State)> on_state, std::function<void(v1::Finished)> on_end);
   bool started() const { return thread_.joinable(); }
   /// True from Run() until the end has been handed to AddEnd().
   bool running() const { return started() && !end_.has_value(); }
   bool ended() const { return end_.has_value(); }
   void Stop() { thread_.request_stop(); }
 
-  void AddState(const dem::State& state);
+  void AddState(v1::State state);
   void AddEnd(v1::Finished finished);
 
   /// Messages not yet sent over the present stream: batches of states, then the end.
@@ -46,8 +44,10 @@ class HeldAttempt {
   void Acknowledge(std::int64_t up_to);
 
  private:
-  std::int64_t id_;
-  v1::AttemptSpec spec_;
+  v1::Finished RunDem(Specimens& specimens, const Checkpoints* checkpoints,
+                      const std::function<void(v1::State)>& on_state, std::stop_token stop) const;
+
+  v1::Lease lease_;
   std::optional<RestingRun> resting_;
   std::deque<v1::State> kept_;  // not acknowledged; kept_[0] has position first_
   std::int64_t first_ = 0;

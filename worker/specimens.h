@@ -1,7 +1,6 @@
 #pragma once
 // The packings and meshes this process has fetched or generated, shared by its slots.
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <stop_token>
@@ -14,12 +13,9 @@
 #include "calib/v1/worker.pb.h"
 #include "dem/geometry/triangle_mesh.h"
 #include "dem/particles/packing.h"
+#include "worker/program/fetch.h"
 
 namespace calib::worker {
-
-/// Content by digest. Called on a thread of its own; should end soon after a stop is asked for.
-using Fetch =
-    std::function<absl::StatusOr<std::string>(const std::string& digest, std::stop_token)>;
 
 /// What a run needs beside its spec.
 struct Specimen {

@@ -12,7 +12,6 @@
 #include <thread>
 #include <utility>
 
-#include "dem/model/state.h"
 #include "dem/registry/catalog.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/check_message.h"
@@ -22,6 +21,7 @@
 #include "proto/rpc/text_kinds.h"
 #include "worker/checkpoints.h"
 #include "worker/held_attempt.h"
+#include "worker/program/programs.h"
 #include "worker/server_link.h"
 #include "worker/specimens.h"
 
@@ -60,7 +60,14 @@ class Worker::Impl {
                    }}),
         specimens_([this](const std::string& digest, std::stop_token stop) {
           return link_.GetBlob(digest, std::move(stop));
-        }) {}
+        }),
+        programs_({.fetch =
+                       [this](const std::string& digest, std::stop_token stop) {
+                         return link_.GetBlob(digest, std::move(stop));
+                       },
+                   .scratch = options_.scratch,
+                   .allowed = options_.allowed_commands,
+                   .slots = options_.slots}) {}
 
   absl::Status Run() {
     signals_.async_wait([this](const boost::system::error_code& error, int /*signal*/) {
@@ -68,6 +75,9 @@ class Worker::Impl {
         Stop();
       }
     });
+    for (const std::string& name : programs_.NotFound()) {
+      spdlog::warn("not_found allow_command={}: no campaign can run it here", name);
+    }
     if (!options_.checkpoints.empty()) {
       auto opened = Checkpoints::Open(options_.checkpoints, options_.most_checkpoint_bytes);
       if (opened.ok()) {
@@ -94,6 +104,7 @@ class Worker::Impl {
     hello.set_engine_version(dem::EngineVersion());
     hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
     hello.set_cpu(rpc::Fitted(v1::NAME, options_.cpu));
+    for (const std::string& name : programs_.AllowedNames()) hello.add_programs(name);
     hello.set_checkpoints(checkpoints_.has_value() ? checkpoints_->identity() : "");
     for (auto& [id, attempt] : held_) {
       hello.add_attempts(id);
@@ -259,6 +270,10 @@ class Worker::Impl {
     if (!added) {
       return;
     }
+    if (lease.model_case() == v1::Lease::MODEL_NOT_SET) {
+      EndWithout(it->second, id, v1::Finished::OUTCOME_FAILED, "the lease names no model");
+      return;
+    }
     if (stopping_ || draining_) {
       EndWithout(it->second, id, v1::Finished::OUTCOME_STOPPED, "the worker is leaving");
       return;
@@ -281,9 +296,9 @@ class Worker::Impl {
         ++running;
         spdlog::info("start attempt={}", id);
         attempt.Run(
-            specimens_, checkpoints_.has_value() ? &*checkpoints_ : nullptr,
-            [this, id = id](const dem::State& state) {
-              asio::post(io_, [this, id, state] { Reached(id, state); });
+            specimens_, programs_, checkpoints_.has_value() ? &*checkpoints_ : nullptr,
+            [this, id = id](v1::State state) {
+              asio::post(io_, [this, id, state = std::move(state)] { Reached(id, state); });
             },
             [this, id = id](v1::Finished finished) {
               asio::post(io_, [this, id, finished = std::move(finished)] { Ended(id, finished); });
@@ -292,7 +307,7 @@ class Worker::Impl {
     }
   }
 
-  void Reached(std::int64_t id, const dem::State& state) {
+  void Reached(std::int64_t id, const v1::State& state) {
     if (const auto found = held_.find(id); found != held_.end()) {
       found->second.AddState(state);
       Send(found->second);
@@ -425,6 +440,7 @@ class Worker::Impl {
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;
   Specimens specimens_;
+  Programs programs_;
   std::optional<Checkpoints> checkpoints_;
   std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out
   std::map<std::int64_t, HeldAttempt> held_;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "proto/rpc/access.h"
@@ -22,6 +23,8 @@ struct WorkerOptions {
   std::string cpu{};                      ///< model name, recorded with every attempt
   std::string checkpoints{};              ///< folder for runs that rest; empty: none are kept
   std::int64_t most_checkpoint_bytes = std::int64_t{4} << 30;
+  std::vector<std::string> allowed_commands{};  ///< programs that may run as models; "*": any
+  std::string scratch{};                        ///< folder below which they run; empty: the usual
   std::chrono::milliseconds farewell{
       3000};  ///< longest wait for the last acknowledgement after a stop
 };

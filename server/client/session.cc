@@ -222,6 +222,8 @@ absl::Status Session::StartWorkers(int count) {
                                        absl::StrCat("local-", getpid(), "-", i),
                                        "--checkpoints",
                                        Checkpoints(),
+                                       "--allow-command",  // what the user's own file names
+                                       "*",
                                        "--exit-with-parent",
                                        absl::StrCat(getpid())};
     const rpc::AccessChoice access = AccessAt(address_);

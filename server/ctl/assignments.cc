@@ -26,6 +26,24 @@ std::vector<std::string> KnownNames(const campaign::Campaign& campaign) {
   return names;
 }
 
+// Of a program's parameter: what it is measured in is all that is known of it.
+std::string ApplyToProgram(const std::string& name, const std::string& text,
+                           const campaign::Campaign& campaign,
+                           std::map<std::string, double>& values) {
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    if (parameter.name != name) continue;
+    if (values.contains(name)) return absl::StrCat("--set ", name, " is given twice");
+    const auto value = campaign::ParseQuantity(text, parameter.unit);
+    if (!value.ok()) {
+      return absl::StrCat("--set ", name, ": ", std::string(value.status().message()));
+    }
+    values[name] = *value;
+    return "";
+  }
+  return absl::StrCat("--set ", name, ": the campaign has no such parameter; ",
+                      campaign::Suggestion(name, KnownNames(campaign)));
+}
+
 // What is wrong with one assignment, or nothing.
 std::string Apply(const std::string& assignment, const campaign::Campaign& campaign,
                   std::map<std::string, double>& values) {
@@ -35,6 +53,9 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
                         " is not NAME=VALUE, e.g. --set young_modulus='2 GPa'");
   }
   const std::string name = assignment.substr(0, equals);
+  if (campaign.program) {
+    return ApplyToProgram(name, assignment.substr(equals + 1), campaign, values);
+  }
   const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
   if (info == nullptr) {
     return absl::StrCat("--set ", name, ": the model has no such parameter; ",
@@ -71,6 +92,10 @@ absl::StatusOr<std::vector<double>> ApplyAssignments(const std::vector<std::stri
     const auto value = values.find(parameter.name);
     if (value == values.end()) {
       if (refused.contains(parameter.name)) continue;
+      if (campaign.program) {  // a dry run does with any
+        calibrated.push_back(parameter.prior.Quantile(0.5));
+        continue;
+      }
       problems.push_back(absl::StrCat(
           parameter.name, " is calibrated in this campaign and needs a value: --set ",
           parameter.name, "=VALUE", parameter.unit == "1" ? "" : "[ " + parameter.unit + "]"));

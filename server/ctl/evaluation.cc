@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -26,6 +27,7 @@ std::string ReadAll(const std::string& path) {
 
 absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const Task& task,
                                              const std::string& folder) {
+  if (task.program) return StartProgram(program, task, folder);
   std::string json;
   if (!google::protobuf::util::MessageToJsonString(task.spec, &json).ok()) {
     return absl::InternalError("the evaluation cannot be written as JSON");
@@ -56,6 +58,24 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
   ASSIGN_OR_RETURN(auto process, client::ChildProcess::Start(program, arguments, folder + "/log"));
   return Evaluation(std::move(process), folder);
 }
+
+absl::StatusOr<Evaluation> Evaluation::StartProgram(const std::string& program, const Task& task,
+                                                    const std::string& folder) {
+  RETURN_IF_ERROR(WriteFile(folder + "/run.bin", task.program->SerializeAsString()));
+  std::error_code error;
+  std::filesystem::create_directories(folder + "/files", error);
+  for (const auto& [digest, content] : task.files) {
+    RETURN_IF_ERROR(WriteFile(absl::StrCat(folder, "/files/", digest), content));
+  }
+  const std::vector<std::string> arguments = {
+      "--once-program",     folder + "/run.bin",     "--files", folder + "/files",
+      "--report",           folder + "/report.json", "-o",      folder + "/states.csv",
+      "--exit-with-parent", std::to_string(getpid())};
+  ASSIGN_OR_RETURN(auto process, client::ChildProcess::Start(program, arguments, folder + "/log"));
+  return Evaluation(std::move(process), folder);
+}
+
+std::string Evaluation::Report() const { return ReadAll(folder_ + "/report.json"); }
 
 int Evaluation::StatesSoFar() const {
   const std::string table = Table();

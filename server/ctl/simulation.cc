@@ -46,6 +46,7 @@ std::string Below(const std::string& folder, const std::string& name) {
 }  // namespace
 
 bool HasPictures(const campaign::Experiment& experiment) {
+  if (std::holds_alternative<campaign::ProgramSpecimen>(experiment.specimens.front())) return false;
   const dem::TestInfo* const test = dem::FindTest(experiment.test);
   return test == nullptr || test->needs_packing;
 }
@@ -78,6 +79,7 @@ absl::Status Simulation::StartNext(const std::string& program, const std::string
   const std::size_t e = runs_.size();
   const campaign::Experiment& measured = experiment(e);
   const std::filesystem::path own = std::filesystem::path(folder) / std::to_string(e);
+  if (campaign_.program) return StartProgram(program, own.string());
   Evaluation::Task task{.spec = messages::SpecOf(campaign_, options_.experiments[e], options_.run),
                         .packing = PackingText(measured, options_.run.stream, contents_),
                         .meshes = MeshContents(measured, contents_),
@@ -96,6 +98,22 @@ absl::Status Simulation::StartNext(const std::string& program, const std::string
                      task.vtk.empty() ? options_.checkpoint : options_.vtk, ": ", error.message()));
   }
   ASSIGN_OR_RETURN(auto started, Evaluation::Start(program, task, own.string()));
+  runs_.push_back(std::move(started));
+  return absl::OkStatus();
+}
+
+absl::Status Simulation::StartProgram(const std::string& program, const std::string& own) {
+  Evaluation::Task task;
+  task.program =
+      messages::ProgramRunOf(campaign_, options_.experiments[runs_.size()], options_.run);
+  task.program->set_threads(1);
+  for (const campaign::ProgramFile& file : campaign_.program->files) {
+    task.files[file.digest] = contents_.at(file.path);
+  }
+  std::error_code error;
+  std::filesystem::create_directories(own, error);
+  if (error) return absl::PermissionDeniedError(absl::StrCat(own, ": ", error.message()));
+  ASSIGN_OR_RETURN(auto started, Evaluation::Start(program, task, own));
   runs_.push_back(std::move(started));
   return absl::OkStatus();
 }

@@ -49,6 +49,7 @@ class Simulation {
   const Evaluation& run(std::size_t e) const { return runs_[e]; }
 
  private:
+  absl::Status StartProgram(const std::string& program, const std::string& own);
   absl::Status StartNext(const std::string& program, const std::string& folder);
   void ShowProgress(client::ProgressLine& line) const;
 

@@ -74,8 +74,10 @@ std::vector<campaign::Problem> BeyondRules(const campaign::Campaign& campaign,
   }
   for (std::size_t e = 0; e < campaign.experiments.size(); ++e) {
     for (const campaign::RunOf& run : runs) {
-      const auto spec = messages::SpecOf(campaign, static_cast<int>(e), run);
-      if (const absl::Status status = rpc::CheckMessage(spec); !status.ok()) {
+      const v1::Lease lease = messages::LeaseOf(campaign, static_cast<int>(e), run);
+      const absl::Status status = lease.has_program() ? rpc::CheckMessage(lease.program())
+                                                      : rpc::CheckMessage(lease.spec());
+      if (!status.ok()) {
         return {{.file = file,
                  .line = 0,
                  .key = "experiments",

@@ -47,7 +47,7 @@ Section EffectParameter() {
   return {"effect_parameter",
           "model.user_effects.NAME.parameters.NAME",
           {
-              {"unit", Text(), "1", "of its values"},
+              {"unit", Text(), "that of its prior's numbers", "of its values"},
               {"null", NumberOfCatalogue(), "",
                "value at which the effect vanishes; one parameter at least has it"},
               {"default", NumberOfCatalogue(), "", "where nothing is said of it"},

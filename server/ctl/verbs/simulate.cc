@@ -1,14 +1,17 @@
 // One model evaluation of each experiment at given parameters, by calib-worker processes, as many
 // at a time as cores.
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
+#include "server/campaign/file/text/data_file.h"
 #include "server/client/child_process.h"
 #include "server/client/interrupt.h"
 #include "server/client/temporary_folder.h"
@@ -21,6 +24,8 @@
 #include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
 #include "server/report/documents/json_documents.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -63,6 +68,65 @@ bool HasStates(const Simulation& simulation) {
     if (simulation.run(e).StatesSoFar() > 0) return true;
   }
   return false;
+}
+
+// The states of a run beside what was measured, as far as it has come.
+void PrintBeside(const campaign::Experiment& experiment, const std::string& csv) {
+  std::vector<campaign::TableProblem> ignored;
+  const campaign::DataTable states(csv, {}, ignored);
+  std::vector<std::string> columns = {
+      "step", experiment.control_name.empty() ? "reading" : experiment.control_name};
+  std::vector<std::vector<double>> values;
+  for (const campaign::MeasuredObservable& observable : experiment.observables) {
+    columns.push_back(observable.name);
+    columns.emplace_back("measured");
+    values.push_back(states.rows() > 0 ? states.ColumnWithGaps(observable.name, ignored)
+                                       : std::vector<double>());
+  }
+  report::TextTable table(columns);
+  for (std::size_t row = 0; row < states.rows() && row < experiment.control.size(); ++row) {
+    std::vector<std::string> cells = {std::to_string(row),
+                                      report::Number(experiment.control[row], 5)};
+    for (std::size_t j = 0; j < values.size(); ++j) {
+      const std::vector<double>& measured = experiment.observables[j].values;
+      cells.push_back(report::Number(values[j][row], 6));
+      cells.push_back(measured.empty() ? "" : report::Number(measured[row], 6));
+    }
+    table.AddRow(std::move(cells));
+  }
+  std::cerr << table.ToString();
+}
+
+// The dry run of a program: what it was asked, what it answered, what that cost.
+void PrintDryRun(const Simulation& simulation) {
+  constexpr double kMib = 1048576;
+  for (std::size_t e = 0; e < simulation.size(); ++e) {
+    const campaign::Experiment& experiment = simulation.experiment(e);
+    const auto report = nlohmann::json::parse(simulation.run(e).Report(), nullptr, false);
+    if (!report.is_object()) continue;  // it could not begin: said with what failed
+    std::cerr << "\n"
+              << experiment.name << " was asked:\n  " << report.value("request", "") << "\n";
+    PrintBeside(experiment, simulation.run(e).Table());
+    const auto lines = report.value("ignored_lines", 0);
+    std::cerr << simulation.run(e).StatesSoFar() << " of " << experiment.control.size()
+              << " states (SI) in " << report::Duration(report.value("wall_seconds", 0.0)) << ", "
+              << report::Number(report.value("core_seconds", 0.0), 3) << " core seconds, at most "
+              << report::Number(report.value("peak_memory", 0.0) / kMib, 3) << " MiB; " << lines
+              << " line(s) of its output were no answer and are ignored"
+              << (lines > 0 ? ", the first:" : ".") << "\n";
+    for (const auto& line : report.value("ignored", nlohmann::json::array())) {
+      if (line.is_string()) std::cerr << "  | " << line.get<std::string>() << "\n";
+    }
+    for (const auto& sentence : report.value("not_kept", nlohmann::json::array())) {
+      if (sentence.is_string()) std::cerr << "! " << sentence.get<std::string>() << "\n";
+    }
+    if (report.value("all_at_once", false)) {
+      std::cerr << "! All states came at once, at its end: no run of it can be stopped early. Let "
+                   "the program flush what it prints after each load step.\n";
+    }
+    std::istringstream words(report.value("words", ""));
+    for (std::string line; std::getline(words, line);) std::cerr << "  stderr | " << line << "\n";
+  }
 }
 
 // Prints what went wrong with single experiments; returns the exit code.
@@ -125,6 +189,7 @@ absl::StatusOr<int> Simulate(const CommonOptions& common, const SimulateOptions&
   } else if (options.output.empty()) {
     std::cout << table;
   }
+  if (campaign.program && !common.json) PrintDryRun(simulation);
   return ReportFailures(simulation);
 }
 

@@ -125,6 +125,12 @@ std::string UnitOfNumbers(MapReader& map) {
 
 }  // namespace
 
+std::string UnitOfPrior(const YamlNode& node) {
+  ProblemList ignored("");
+  MapReader map(node, "", SectionOf("prior"), ignored);
+  return UnitOfNumbers(map);
+}
+
 std::optional<Prior> ReadPrior(const YamlNode& node, const std::string& path,
                                const std::string& si_unit, ProblemList& problems) {
   MapReader map(node, path, SectionOf("prior"), problems);

@@ -19,6 +19,9 @@ bool HoldsMass(const inference::Prior& prior, const std::string& key, MapReader&
 std::optional<inference::Prior> ReadPrior(const YamlNode& node, const std::string& path,
                                           const std::string& si_unit, ProblemList& problems);
 
+/// The SI unit that the numbers of a prior carry, or that its `unit` says; "1" where they are plain.
+std::string UnitOfPrior(const YamlNode& node);
+
 /// ReadPrior() for a parameter that no catalogue knows (precomputed runs): its unit is what its
 /// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).
 std::optional<inference::Prior> ReadFreePrior(const YamlNode& node, const std::string& path,

@@ -127,6 +127,9 @@ void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::Ef
       info.unit = parsed->factor == 1 ? *unit : SiName(parsed->dimension);
     }
   }
+  if (const YamlNode* prior = map.Find("prior"); prior != nullptr && !map.Has("unit")) {
+    info.unit = UnitOfPrior(*prior);
+  }
   info.null_value = map.Quantity("null", info.unit, {});
   info.default_value = map.Quantity("default", info.unit, {});
   info.description = map.Text("description").value_or("");
