@@ -93,9 +93,9 @@ const std::map<std::string, std::string>& WordsOfSpec() {
 }
 
 // The first field in which two evaluations differ, but for names and chance; empty: none.
-std::string OtherField(const v1::AttemptSpec& a, const v1::AttemptSpec& b) {
+std::string OtherField(const google::protobuf::Message& a, const google::protobuf::Message& b) {
   using google::protobuf::util::MessageDifferencer;
-  const auto* descriptor = v1::AttemptSpec::descriptor();
+  const auto* descriptor = a.GetDescriptor();
   for (int i = 0; i < descriptor->field_count(); ++i) {
     const auto* field = descriptor->field(i);
     if (field->name() == "experiment" || field->name() == "threads" || field->name() == "seed" ||
@@ -130,9 +130,13 @@ std::string WhyOtherTests(const campaign::Campaign& campaign, const campaign::Ca
     if (a.specimens.size() != b.specimens.size()) return differs("the number of packings");
     for (std::size_t s = 0; s < a.specimens.size(); ++s) {
       const auto stream = static_cast<int>(s);
-      const std::string field =
-          OtherField(messages::SpecOf(campaign, own[i], {.values = values, .stream = stream}),
-                     messages::SpecOf(design, other[i], {.values = of_design, .stream = stream}));
+      const v1::Lease here =
+          messages::LeaseOf(campaign, own[i], {.values = values, .stream = stream});
+      const v1::Lease there =
+          messages::LeaseOf(design, other[i], {.values = of_design, .stream = stream});
+      if (here.model_case() != there.model_case()) return differs("the model");
+      const std::string field = here.has_program() ? OtherField(here.program(), there.program())
+                                                   : OtherField(here.spec(), there.spec());
       if (!field.empty()) return differs(absl::StrCat("`", field, "`"));
     }
     const auto same_readings = [](const auto& x, const auto& y) {

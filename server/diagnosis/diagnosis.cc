@@ -70,7 +70,8 @@ class Inquiry {
     }
     NameUnits();
     if (options_.next_experiment && !options_.then && !options_.only_adequacy &&
-        !view_.campaign.precomputed && diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
+        campaign::HasOwnEngine(view_.campaign) &&
+        diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
       const absl::Status planned = PlanNext();
       if (absl::IsCancelled(planned)) return planned;
       if (!planned.ok()) {
@@ -107,7 +108,7 @@ class Inquiry {
   }
 
   absl::Status TellMeasurement(const MadeMeasurement& made) {
-    if (options_.only_adequacy || view_.campaign.precomputed) {
+    if (options_.only_adequacy || !campaign::HasOwnEngine(view_.campaign)) {
       return absl::FailedPreconditionError(
           "a further measurement is told by runs of its test, and here none are made");
     }

@@ -78,7 +78,16 @@ std::vector<std::string> DoubtsOf(const campaign::Campaign& campaign) {
       });
   const bool has_grains =
       std::none_of(experiments.begin(), experiments.end(), &campaign::MakesItsBodies);
-  if (one_packing && has_grains && !campaign.precomputed) {
+  const bool of_a_test = std::any_of(experiments.begin(), experiments.end(),
+                                     [](const auto& e) { return !e.test.empty(); });
+  if (campaign.program) {
+    if (one_packing && of_a_test) {
+      doubts.push_back(
+          "Every fitted test is run in one realization: by how much another specimen differs is "
+          "not in the errors, and may be taken for a missing effect unless the specimen is the "
+          "measured one. realizations: {packing: [...]}, or a number of seeds, shows it.");
+    }
+  } else if (one_packing && has_grains && !campaign.precomputed) {
     doubts.push_back(absl::StrCat(
         "Every fitted test is run on one packing: by how much another one differs is not in the "
         "errors, and may be taken for a missing effect unless the packing is the measured one. "

@@ -194,8 +194,17 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
   }
-  if (campaign.precomputed) {
-    if (dem::FindEffect(name) != nullptr) {
+  if (!campaign::HasOwnEngine(campaign)) {
+    const bool is_own =
+        std::any_of(declared.begin(), declared.end(),
+                    [&name](const dem::UserEffect& effect) { return effect.info.name == name; });
+    if (!is_own && campaign.program) {
+      return absl::StrCat(
+          "the program of this campaign knows no ", name,
+          "; `calibctl diagnose` says what it would change, and what the program can switch on is "
+          "declared under model.effects");
+    }
+    if (!is_own) {
       return absl::StrCat(
           "runs that were made elsewhere cannot be joined by ", name,
           "; `calibctl diagnose` says what instruments or a denser start would change of them, and "

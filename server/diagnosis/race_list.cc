@@ -129,7 +129,7 @@ std::vector<RacingEffect> EntriesOnCurves(const report::CampaignView& view,
   return entries;
 }
 
-// Whether rows of the campaign's tables have the effect.
+// Whether rows of the campaign's tables, or runs of its program, have the effect.
 bool IsHeld(const campaign::Campaign& campaign, const std::string& effect) {
   const auto& declared = campaign.model.user_effects;
   return std::any_of(declared.begin(), declared.end(),
@@ -150,6 +150,12 @@ std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& e
 
 // Nobody takes part in a race.
 absl::Status NobodyIn(const campaign::Campaign& campaign, const Race& race) {
+  if (campaign.program) {
+    return absl::FailedPreconditionError(
+        "the program declares no effect (model.effects) that is not part of the model, and none of "
+        "the measurement can be calculated on what is read, so there is nothing to ask; "
+        "`not_excitable` says why");
+  }
   if (!campaign.precomputed) {
     return absl::FailedPreconditionError(
         "no effect of this build can join the model and be seen in the fitted experiments, so "
@@ -243,7 +249,7 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
                             const std::vector<std::string>& without) {
   const campaign::Campaign& campaign = view.campaign;
-  const bool elsewhere = campaign.precomputed.has_value();
+  const bool elsewhere = !campaign::HasOwnEngine(campaign);
   const EffectsOnCurves curves = elsewhere ? EffectsOnReadings(campaign) : EffectsOnCurves{};
   Race race{.left_out = without};
   for (const campaign::CalibratedParameter& parameter : campaign.parameters)

@@ -8,6 +8,8 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/data/data_set.h"
+#include "server/campaign/model/race.h"
+#include "server/diagnosis/reading_effects.h"
 #include "server/messages/read_words.h"
 #include "server/report/views/run_table.h"
 
@@ -36,6 +38,29 @@ absl::StatusOr<std::vector<int>> PlacesAmong(const campaign::Campaign& design,
   return places;
 }
 
+// An effect of the measurement on what a program answers, which knows nothing of it.
+struct OwnCurveEffect {
+  std::size_t place;  // of its strength among the values of a run
+  double null;
+  CurveEffect effect;
+};
+
+// None where runs are this program's own: those have such effects themselves.
+std::vector<OwnCurveEffect> EffectsOnOwnCurves(const campaign::Campaign& campaign,
+                                               const std::vector<std::string>& names) {
+  std::vector<OwnCurveEffect> effects;
+  if (!campaign.program) return effects;
+  const EffectsOnCurves known = EffectsOnReadings(campaign);
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    const auto found = known.by_strength.find(names[j]);
+    if (found == known.by_strength.end()) continue;
+    effects.push_back({.place = j,
+                       .null = campaign::NullOf(campaign, names[j]).value_or(0),
+                       .effect = found->second});
+  }
+  return effects;
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignView& design,
@@ -46,6 +71,7 @@ absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignVie
   std::map<int, Index> row_of;  // by sample
   for (std::size_t i = 0; i < table.sample.size(); ++i)
     row_of[table.sample[i]] = static_cast<Index>(i);
+  const std::vector<OwnCurveEffect> on_curves = EffectsOnOwnCurves(design.campaign, names);
   std::vector<EndedBatch> batches;
   for (const v1::Sample& sample : design.samples) {  // ascending by index
     const auto stage = messages::PurposeOf(sample);
@@ -70,6 +96,11 @@ absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignVie
     for (Index k = 0; k < readings.size(); ++k) {
       const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
       readings[k] = reading.value + readings[k] * reading.sd;
+    }
+    for (const OwnCurveEffect& own : on_curves) {
+      const double value = ended.run.values[own.place];
+      if (value == own.null) continue;
+      readings = own.effect(Eigen::MatrixXd(readings), Eigen::VectorXd::Constant(1, value)).row(0);
     }
   }
   return batches;

@@ -221,8 +221,9 @@ BaseRuns WithoutRuns(const campaign::Campaign& campaign) {
   const inference::DataSet data = campaign::MakeDataSet(campaign);
   BaseRuns base{.scale = HistoryScale(campaign, data),
                 .elsewhere = campaign.precomputed.has_value(),
-                .calculated = campaign.precomputed ? EffectsOnReadings(campaign).by_strength
-                                                   : CalculatedOn(campaign, data),
+                .calculated = campaign::HasOwnEngine(campaign)
+                                  ? CalculatedOn(campaign, data)
+                                  : EffectsOnReadings(campaign).by_strength,
                 .packings = PackingsApart(campaign)};
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::VectorXd sd(t);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -89,6 +90,13 @@ v1::ProgramTable TableOf(const campaign::ProgramTable& table,
     column.set_factor(factor != table.factors.end() ? factor->second : 1);
   }
   return message;
+}
+
+// Whether it is an effect that the campaign's program may switch on.
+bool IsDeclared(const campaign::Campaign& campaign, const std::string& effect) {
+  const auto& declared = campaign.model.user_effects;
+  return std::any_of(declared.begin(), declared.end(),
+                     [&effect](const dem::UserEffect& own) { return own.info.name == effect; });
 }
 
 // The same bytes for equal messages.
@@ -209,7 +217,16 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
   message.set_experiment(measured.name);
   const auto realization = static_cast<std::size_t>(run.stream) % measured.specimens.size();
   message.set_realization(static_cast<int>(realization));
-  const dem::Model model = campaign::ModelOf(campaign, run.values);
+  dem::Model model = campaign::ModelOf(campaign, run.values);
+  // Effects of the measurement are calculated on what the program answers; it knows none of them.
+  std::erase_if(model.effects,
+                [&campaign](const std::string& name) { return !IsDeclared(campaign, name); });
+  std::erase_if(model.parameters, [&campaign](const auto& parameter) {
+    const std::string effect = campaign::EffectNamedIn(parameter.first);
+    const auto& race = campaign.race;
+    return std::find(race.begin(), race.end(), effect) != race.end() &&
+           !IsDeclared(campaign, effect);
+  });
   message.mutable_parameters()->insert(model.parameters.begin(), model.parameters.end());
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     if (model.parameters.contains(parameter.name)) {
@@ -248,6 +265,12 @@ v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const camp
   return lease;
 }
 
+std::string SpecDigest(v1::AttemptSpec spec) {
+  spec.clear_experiment();
+  spec.clear_threads();
+  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", BytesOf(spec)));
+}
+
 std::string RunDigest(v1::Lease run) {
   if (run.has_program()) {
     v1::ProgramRun& program = *run.mutable_program();
@@ -257,10 +280,7 @@ std::string RunDigest(v1::Lease run) {
     program.clear_keep();
     return campaign::Sha256Hex(absl::StrCat("program\n", BytesOf(program)));
   }
-  v1::AttemptSpec& spec = *run.mutable_spec();
-  spec.clear_experiment();
-  spec.clear_threads();
-  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", BytesOf(spec)));
+  return SpecDigest(std::move(*run.mutable_spec()));
 }
 
 }  // namespace calib::messages

@@ -29,6 +29,7 @@ v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const camp
 /// SHA-256 of everything that determines the states: of a spec all but its name and thread count,
 /// and the version of the mechanics; of a program's run all but threads, limits and what is kept of
 /// it.
+std::string SpecDigest(v1::AttemptSpec spec);
 std::string RunDigest(v1::Lease run);
 
 }  // namespace calib::messages

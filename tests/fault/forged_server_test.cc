@@ -108,7 +108,7 @@ TEST(ForgedServer, ALeaseThatBreaksARuleHasFailedAndTheWorkerGoesOn) {
   const auto finished = link.finished();
   ASSERT_EQ(finished.size(), 2U);
   EXPECT_EQ(finished.at(5).outcome(), v1::Finished::OUTCOME_FAILED);
-  EXPECT_EQ(finished.at(5).reason(), "ServerMessage.lease.spec is missing");
+  EXPECT_EQ(finished.at(5).reason(), "the lease names no model");
   EXPECT_EQ(finished.at(6).outcome(), v1::Finished::OUTCOME_FAILED);
   EXPECT_EQ(finished.at(6).reason(),
             "ServerMessage.lease.spec.density is nan, it has to be finite and at least 0");

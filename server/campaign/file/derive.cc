@@ -21,6 +21,9 @@ void ChangeModel(const Derivation& derivation, YamlNode& root) {
     YamlNode& declared = YamlAt(YamlAt(model, "precomputed"), "effects");
     for (const std::string& effect : derivation.effects)
       YamlAt(YamlAt(declared, effect), "acts") = YamlScalar("true");
+  } else if (YamlFind(model, "command") != nullptr) {
+    for (const std::string& effect : derivation.effects)
+      YamlAt(YamlAt(YamlAt(model, "effects"), effect), "acts") = YamlScalar("true");
   } else if (!derivation.effects.empty()) {
     std::vector<YamlNode> effects;
     if (const YamlNode* given = YamlFind(model, "effects"); given != nullptr) {

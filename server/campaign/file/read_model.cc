@@ -189,12 +189,31 @@ void HoldToAdmissible(const dem::ParameterInfo& info, const std::string& unit,
   HoldsMass(prior, key, parameters);
 }
 
+// Of a program's effect the parameter with this dotted name; nullptr: there is none.
+const dem::ParameterInfo* DeclaredParameter(const Campaign& campaign, const std::string& name) {
+  if (!campaign.program) return nullptr;
+  for (const dem::UserEffect& effect : campaign.model.user_effects) {
+    for (const dem::ParameterInfo& own : effect.info.parameters) {
+      if (absl::StrCat(effect.info.name, ".", own.name) == name) return &own;
+    }
+  }
+  return nullptr;
+}
+
 void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign) {
   const YamlNode& node = *parameters.Find(name);
   const std::string path = parameters.PathOf(name);
   CalibratedParameter parameter{.name = name, .unit = "", .prior = {}};
   if (campaign.precomputed || campaign.program) {
-    if (const auto prior = ReadFreePrior(node, path, parameters.problems(), parameter.unit)) {
+    // What an effect's declaration says of its unit holds where these numbers have none.
+    const dem::ParameterInfo* declared = DeclaredParameter(campaign, name);
+    if (declared != nullptr && UnitOfPrior(node) == "1") {
+      parameter.unit = declared->unit;
+      if (const auto prior = ReadPrior(node, path, parameter.unit, parameters.problems())) {
+        parameter.prior = *prior;
+      }
+    } else if (const auto prior =
+                   ReadFreePrior(node, path, parameters.problems(), parameter.unit)) {
       parameter.prior = *prior;
     }
     campaign.parameters.push_back(parameter);

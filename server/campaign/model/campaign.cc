@@ -188,6 +188,8 @@ inference::Proposal FirstProposalOf(const Campaign& campaign) {
   return proposal;
 }
 
+bool HasOwnEngine(const Campaign& campaign) { return !campaign.precomputed && !campaign.program; }
+
 bool HasNamesOfItsOwn(const Campaign& campaign, const Experiment& experiment) {
   return campaign.precomputed || (campaign.program && experiment.test.empty());
 }

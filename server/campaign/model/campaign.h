@@ -309,6 +309,9 @@ int StreamOf(const Campaign& campaign, int sample);
 /// What first_proposal says, in the coordinates of the priors; the prior alone without it.
 inference::Proposal FirstProposalOf(const Campaign& campaign);
 
+/// Whether runs are of this program's own DEM: neither made elsewhere nor by a program.
+bool HasOwnEngine(const Campaign& campaign);
+
 /// Whether observables and readings are what the campaign's tables say, whatever the catalogue
 /// has: runs made elsewhere, and a program's in a test that has no name here.
 bool HasNamesOfItsOwn(const Campaign& campaign, const Experiment& experiment);

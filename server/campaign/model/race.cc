@@ -191,6 +191,7 @@ std::string WhyNotTogether(const Campaign& campaign, const std::vector<std::stri
     }
     model.effects.push_back(name);
   }
+  if (!HasOwnEngine(campaign)) return "";
   if (const auto problems = dem::MaterialProblems(model); !problems.empty()) {
     return problems.front();  // the campaign's own model has none
   }

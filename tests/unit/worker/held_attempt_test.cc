@@ -7,8 +7,17 @@ namespace {
 
 void AddStates(HeldAttempt& attempt, int first, int count) {
   for (int i = first; i < first + count; ++i) {
-    attempt.AddState({.load_step = i, .values = {1.0 * i}});
+    v1::State state;
+    state.set_load_step(i);
+    state.add_values(i);
+    attempt.AddState(state);
   }
+}
+
+v1::Lease LeaseOfSeven() {
+  v1::Lease lease;
+  lease.set_attempt(7);
+  return lease;
 }
 
 v1::Finished Completed() {
@@ -18,7 +27,7 @@ v1::Finished Completed() {
 }
 
 TEST(HeldAttempt, SendsEachStateOnceAndTheEndLast) {
-  HeldAttempt attempt(7, {});
+  HeldAttempt attempt(LeaseOfSeven());
   AddStates(attempt, 0, 2);
   auto messages = attempt.TakeUnsent();
   ASSERT_EQ(messages.size(), 1U);
@@ -36,7 +45,7 @@ TEST(HeldAttempt, SendsEachStateOnceAndTheEndLast) {
 }
 
 TEST(HeldAttempt, SendsWhatIsNotAcknowledgedAgainOverANewStream) {
-  HeldAttempt attempt(7, {});
+  HeldAttempt attempt(LeaseOfSeven());
   AddStates(attempt, 0, 5);
   attempt.AddEnd(Completed());
   (void)attempt.TakeUnsent();
@@ -51,7 +60,7 @@ TEST(HeldAttempt, SendsWhatIsNotAcknowledgedAgainOverANewStream) {
 }
 
 TEST(HeldAttempt, LargeBacklogGoesInBatchesBelowTheMessageLimit) {
-  HeldAttempt attempt(7, {});
+  HeldAttempt attempt(LeaseOfSeven());
   AddStates(attempt, 0, 2500);
   const auto messages = attempt.TakeUnsent();
   ASSERT_EQ(messages.size(), 3U);

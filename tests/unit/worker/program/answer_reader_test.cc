@@ -129,7 +129,7 @@ TEST(AnswerReader, FailsWithASentence) {
   says("{\"load_step\": \"0\", \"p\": 1, \"q\": 2}\n", "load_step is no whole number");
   says("{\"p\": 1}\n", "has no load_step");
   says("{'load_step': 0}\n", "no JSON object");
-  says("{\"end\": \"complete\"}\n", "said that the run is complete with 0 of");
+  says("{\"end\": \"complete\"}\n", "said that the run is complete with 0 of 3 states");
   says("{\"load_step\": 0, \"p\": \"1\"}\n", "p is no number at load step 0");
   says("{\"load_step\": 0, \"p\": true}\n", "p is no number at load step 0");
   says("{\"load_step\": 0, \"p\": 1}\n{\"load_step\": 0, \"p\": 1.5}\n",
