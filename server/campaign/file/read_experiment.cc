@@ -204,6 +204,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   const dem::TestInfo* test = ReadTest(map, campaign, experiment);
   if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
   experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
+  map.TextList("as_stated");  // read with the parameters
   if (campaign.precomputed) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseKeys(map, "has no meaning with precomputed runs; remove it");
