@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
 #include "server/client/progress.h"
 #include "server/messages/read_words.h"
@@ -56,11 +57,16 @@ std::string Explained(const report::Quantity& q) {
 
 }  // namespace
 
-std::string PosteriorText(const v1::Posterior& posterior,
-                          const std::vector<std::string>& warnings) {
-  report::TextTable table(
-      {"<parameter", "mean", "± sd", "cov", "5 %", "50 %", "95 %", "<unit", "<"});
+namespace {
+
+// Of the parameters that are wanted, or of the others; empty: there are none.
+std::string ParametersText(const v1::Posterior& posterior, bool nuisance) {
+  report::TextTable table({nuisance ? "<nuisance" : "<parameter", "mean", "± sd", "cov", "5 %",
+                           "50 %", "95 %", "<unit", "<"});
+  bool any = false;
   for (const auto& p : posterior.parameters()) {
+    if (p.nuisance() != nuisance) continue;
+    any = true;
     const report::DisplayUnit unit = report::UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
     const auto shown = [&unit](double value, int digits) {
       return Number(value * unit.factor, digits);
@@ -71,7 +77,17 @@ std::string PosteriorText(const v1::Posterior& posterior,
                   : p.at_bound()     ? "at a bound of the prior"
                                      : ""});
   }
-  std::string text = table.ToString();
+  return any ? table.ToString() : "";
+}
+
+}  // namespace
+
+std::string PosteriorText(const v1::Posterior& posterior,
+                          const std::vector<std::string>& warnings) {
+  std::string text = ParametersText(posterior, false);
+  if (const std::string nuisance = ParametersText(posterior, true); !nuisance.empty()) {
+    absl::StrAppend(&text, text.empty() ? "" : "\n", nuisance);
+  }
   text += fmt::format(
       "\n{} after {} iteration{}; {} effective samples{}, log evidence {} ± {}{}, {} model "
       "evaluations",

@@ -1,5 +1,6 @@
 #include "server/ctl/assignments.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -53,19 +54,29 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
                         " is not NAME=VALUE, e.g. --set young_modulus='2 GPa'");
   }
   const std::string name = assignment.substr(0, equals);
+  if (const campaign::TiedParameter* tied = campaign::FindTied(campaign, name)) {
+    return absl::StrCat("--set ", name, ": follows from ", absl::StrJoin(tied->inputs, ", "),
+                        " (equal_to: ", tied->text, "), and has no value of its own");
+  }
   if (campaign.program) {
     return ApplyToProgram(name, assignment.substr(equals + 1), campaign, values);
   }
+  const auto calibrated = std::find_if(
+      campaign.parameters.begin(), campaign.parameters.end(),
+      [&name](const campaign::CalibratedParameter& parameter) { return parameter.name == name; });
+  const bool is_setting = calibrated != campaign.parameters.end() && calibrated->setting;
   const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
-  if (info == nullptr) {
+  if (info == nullptr && !is_setting) {
     return absl::StrCat("--set ", name, ": the model has no such parameter; ",
                         campaign::Suggestion(name, KnownNames(campaign)));
   }
   if (values.contains(name)) return absl::StrCat("--set ", name, " is given twice");
-  const std::string& unit = dem::UnitFor(*info, campaign.model.contact);
+  const std::string& unit =
+      is_setting ? calibrated->unit : dem::UnitFor(*info, campaign.model.contact);
   const auto value = campaign::ParseQuantity(assignment.substr(equals + 1), unit);
   if (!value.ok()) return absl::StrCat("--set ", name, ": ", std::string(value.status().message()));
-  const campaign::Range range = campaign::AdmissibleRange(*info);
+  const campaign::Range range =
+      is_setting ? calibrated->setting->range : campaign::AdmissibleRange(*info);
   if (!range.Contains(*value)) {
     return absl::StrCat("--set ", name, ": ", Quoted(assignment.substr(equals + 1)),
                         " is outside what is allowed: ", range.Describe(unit));

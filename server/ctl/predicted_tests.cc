@@ -13,6 +13,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/file/derive.h"
+#include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/campaign/model/sha256.h"
@@ -82,6 +83,15 @@ absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
   return absl::OkStatus();
 }
 
+// What stands in a test to be predicted is meant, whatever the campaign has found of its own tests.
+void KeepAsStated(const campaign::Campaign& campaign, YamlNode& experiment) {
+  std::vector<YamlNode> names;
+  for (const std::string& name : campaign::StatedBeside(experiment, campaign)) {
+    names.push_back(campaign::YamlScalar(name));
+  }
+  if (!names.empty()) campaign::YamlAt(experiment, "as_stated") = campaign::YamlList(names);
+}
+
 }  // namespace
 
 void TakeSpecimen(const YamlNode& from, YamlNode& experiment) {
@@ -125,6 +135,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
         path, 1, "has neither the key test (of one experiment) nor experiments (a list of them)");
   }
   campaign::YamlParse own = campaign::ParseYaml(parent.source.campaign_file());
+  if (own.root) campaign::StateNominalValues(*own.root, parent.campaign);
   const YamlNode* first = own.error ? nullptr : campaign::YamlFind(*own.root, "experiments");
   for (YamlNode& experiment : list.items) {
     if (experiment.kind != Kind::kMap) return ProblemIn(path, experiment.line, "is no experiment");
@@ -139,6 +150,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
     }
     campaign::YamlErase(experiment, "role");
     RETURN_IF_ERROR(SpellOutControl(path, experiment, tests.files));
+    KeepAsStated(parent.campaign, experiment);
     if (first != nullptr && !first->items.empty()) TakeSpecimen(first->items.front(), experiment);
   }
   tests.experiments = list.items;

@@ -61,6 +61,12 @@ std::string WhyOtherParameters(const campaign::Campaign& campaign,
       (tied && (campaign.tied_prior->log_mass() != design.tied_prior->log_mass() ||
                 campaign.tied_prior->correlation() != design.tied_prior->correlation())))
     return "what ties the priors is another";
+  const auto same_tie = [](const campaign::TiedParameter& a, const campaign::TiedParameter& b) {
+    return a.name == b.name && a.text == b.text;
+  };
+  if (!std::equal(campaign.tied.begin(), campaign.tied.end(), design.tied.begin(),
+                  design.tied.end(), same_tie))
+    return "what parameters are equal_to is another";
   return "";
 }
 

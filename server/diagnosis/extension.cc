@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
@@ -148,6 +149,21 @@ std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& eff
   return chosen;
 }
 
+// At the means of the posterior; empty: the modulus is not tied to other parameters.
+std::optional<double> TiedModulus(const report::CampaignView& view) {
+  std::vector<double> means = campaign::MiddleValues(view.campaign);
+  for (std::size_t j = 0; j < means.size(); ++j) {
+    for (const auto& known : view.posterior.parameters()) {
+      if (known.name() == view.campaign.parameters[j].name) means[j] = known.mean();
+    }
+  }
+  const std::vector<double> tied = campaign::TiedValues(view.campaign, means);
+  for (std::size_t k = 0; k < tied.size(); ++k) {
+    if (view.campaign.tied[k].name == "young_modulus") return tied[k];
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
@@ -158,6 +174,7 @@ dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
   for (const auto& parameter : view.posterior.parameters()) {
     if (parameter.name() == "young_modulus") state.modulus = parameter.mean();
   }
+  if (const auto tied = TiedModulus(view); tied) state.modulus = *tied;
   double sum = 0;
   int count = 0;
   const auto take = [&sum, &count](double pressure) {

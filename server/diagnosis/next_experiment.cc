@@ -142,13 +142,14 @@ class Choice {
   void Repeats() {
     for (const campaign::Experiment& experiment : base_.campaign.experiments) {
       if (experiment.role != campaign::Role::kCalibrate) continue;
-      const auto original = EntryNamed(base_.source.campaign_file(), experiment.name);
+      const auto original =
+          EntryNamed(base_.source.campaign_file(), base_.campaign, experiment.name);
       if (!original) continue;
       Proposal repeat{.experiment = RepeatOf(experiment), .separates = LeadingNames(), .entry = {}};
       const std::string name = experiment.name + "_again";
       repeat.entry =
           EntryFor({.experiment = AsMeasured(experiment), .name = name, .file = name + ".csv"},
-                   experiment, *original);
+                   experiment, *original, base_.campaign);
       const auto forecast = ForecastOfRepeat(experiment.name);
       if (!forecast.ok()) {
         plan_.warnings.push_back(

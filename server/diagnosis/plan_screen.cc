@@ -189,11 +189,11 @@ class Planning {
     std::vector<Tried> plans;
     std::map<std::string, std::string> files;
     const std::optional<YamlNode> original =
-        EntryNamed(base_.source.campaign_file(), pattern_.name);
+        EntryNamed(base_.source.campaign_file(), base_.campaign, pattern_.name);
     if (!original) return absl::OkStatus();
     for (TestPlan& plan : Named(std::move(wanted), numbered_ + 1)) {
       ++numbered_;
-      YamlNode entry = EntryFor(plan, pattern_, *original);
+      YamlNode entry = EntryFor(plan, pattern_, *original, base_.campaign);
       ASSIGN_OR_RETURN(const auto text, RivalsText(rivals_.front(), {rivals_.front().values},
                                                    base_.status.campaign(), like_, {entry}));
       const std::string data = DataOf(plan.experiment, pattern_);

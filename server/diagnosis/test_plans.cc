@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "dem/registry/catalog.h"
+#include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/control_way.h"
 #include "server/diagnosis/setting_plans.h"
@@ -190,9 +191,33 @@ std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment&
   return text;
 }
 
+namespace {
+
+// Settings that differ from the pattern's though a parameter of every test that has them would
+// change them.
+std::vector<std::string> KeptAsPlanned(const PlannedExperiment& planned,
+                                       const campaign::Experiment& pattern,
+                                       const campaign::Campaign& campaign) {
+  const std::set<std::string> calibrated = campaign::SettingsOfAll(campaign);
+  std::vector<std::string> kept;
+  for (const auto& [name, value] : planned.settings) {
+    const auto own = pattern.settings.find(name);
+    if (own != pattern.settings.end() && own->second == value) continue;
+    const std::string number = name == "porosity" ? "packing.porosity" : name;
+    if (calibrated.contains(number)) kept.push_back(number);
+    if (name == "porosity" && calibrated.contains("packing.void_ratio"))
+      kept.emplace_back("packing.void_ratio");
+  }
+  return kept;
+}
+
+}  // namespace
+
 std::optional<YamlNode> EntryNamed(const std::string& campaign_file,
+                                   const campaign::Campaign& campaign,
                                    const std::string& experiment) {
-  const auto parsed = campaign::ParseYaml(campaign_file);
+  campaign::YamlParse parsed = campaign::ParseYaml(campaign_file);
+  if (parsed.root) campaign::StateNominalValues(*parsed.root, campaign);
   const YamlNode* list = parsed.root ? campaign::YamlFind(*parsed.root, "experiments") : nullptr;
   if (list == nullptr) return std::nullopt;
   for (const YamlNode& item : list->items) {
@@ -203,7 +228,7 @@ std::optional<YamlNode> EntryNamed(const std::string& campaign_file,
 }
 
 YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
-                  const YamlNode& original) {
+                  const YamlNode& original, const campaign::Campaign& campaign) {
   YamlNode entry = original;
   campaign::YamlAt(entry, "name") = campaign::YamlScalar(plan.name);
   campaign::YamlAt(entry, "test") = campaign::YamlScalar(plan.experiment.test);
@@ -216,6 +241,11 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
     } else {
       campaign::YamlAt(entry, name) = campaign::YamlNumber(value);
     }
+  }
+  if (const auto kept = KeptAsPlanned(plan.experiment, pattern, campaign); !kept.empty()) {
+    std::vector<YamlNode> names;
+    for (const std::string& name : kept) names.push_back(campaign::YamlScalar(name));
+    campaign::YamlAt(entry, "as_stated") = campaign::YamlList(std::move(names));
   }
   const auto pressure = plan.experiment.settings.find("confining_pressure");
   if (pattern.initial_stress && pressure != plan.experiment.settings.end()) {

@@ -71,12 +71,16 @@ std::vector<TestPlan> Named(std::vector<PlannedExperiment> plans, std::size_t fi
 std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern,
                    const std::vector<Eigen::VectorXd>& curves = {});
 
-/// The entry of an experiment in a campaign file; empty: it is not there.
+/// The entry of an experiment in a campaign's file, with the nominal values of settings that are
+/// calibrated and left out there; empty: it is not there.
 std::optional<campaign::YamlNode> EntryNamed(const std::string& campaign_file,
+                                             const campaign::Campaign& campaign,
                                              const std::string& experiment);
 
-/// The pattern's entry in the campaign file with another test, settings and measurement.
+/// The pattern's entry in the campaign file with another test, settings and measurement. What
+/// parameters of the campaign would change of the settings that are planned stays as planned.
 campaign::YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
-                            const campaign::YamlNode& original);
+                            const campaign::YamlNode& original,
+                            const campaign::Campaign& campaign = {});
 
 }  // namespace calib::diagnosis

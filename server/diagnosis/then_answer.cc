@@ -108,12 +108,12 @@ class SecondInquiry {
     const bool repeats = !made_.plan.repeats.empty();
     const campaign::Experiment& pattern =
         repeats ? ExperimentNamed(base_.campaign, made_.plan.repeats) : PatternOf(base_.campaign);
-    const auto original = EntryNamed(base_.source.campaign_file(), pattern.name);
+    const auto original = EntryNamed(base_.source.campaign_file(), base_.campaign, pattern.name);
     if (!original) return absl::InternalError("the pattern has no entry in the campaign file");
     PlannedExperiment changed = made_.plan;
     if (repeats) changed = AsMeasured(pattern);
     test_ = {.entry = EntryFor({.experiment = changed, .name = "next", .file = made_.file}, pattern,
-                               *original),
+                               *original, base_.campaign),
              .file = made_.file,
              .data = made_.content};
     ASSIGN_OR_RETURN(

@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/race.h"
+#include "server/campaign/model/run_settings.h"
 #include "server/campaign/model/sha256.h"
 
 namespace calib::messages {
@@ -183,8 +184,10 @@ v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
                        const campaign::RunOf& run) {
   const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
   const auto specimen = static_cast<std::size_t>(run.stream) % measured.specimens.size();
-  v1::AttemptSpec spec = ToSpec(campaign::MakeScenario(campaign, measured, run),
-                                measured.specimens[specimen], measured.name);
+  const dem::Scenario scenario = campaign::MakeScenario(campaign, measured, run);
+  const auto changed = campaign::ChangedRecipe(campaign, measured, run);
+  v1::AttemptSpec spec = changed ? ToSpec(scenario, *changed, measured.name)
+                                 : ToSpec(scenario, measured.specimens[specimen], measured.name);
   for (const auto& [name, file] : measured.meshes) {
     v1::Mesh& message = *spec.add_meshes();
     message.set_name(name);
@@ -232,6 +235,9 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
     if (model.parameters.contains(parameter.name)) {
       (*message.mutable_units())[parameter.name] = parameter.unit;
     }
+  }
+  for (const campaign::TiedParameter& tied : campaign.tied) {
+    (*message.mutable_units())[tied.name] = tied.unit;
   }
   message.mutable_effects()->Add(model.effects.begin(), model.effects.end());
   campaign::ProgramSettings told = measured.told;

@@ -36,6 +36,7 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
     out.set_q50(summary.q50);
     out.set_q95(summary.q95);
     out.set_at_bound(summary.at_bound);
+    out.set_nuisance(parameter.nuisance);
     const auto& frozen = answer.weighted.frozen;
     out.set_conditioned_on(!frozen.empty() && frozen[i].has_value());
     const Eigen::VectorXd& halves =

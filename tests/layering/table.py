@@ -9,7 +9,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc
 worker     program < .
-server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < campaign/file/shared < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
+server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
            < scheduler < { service report/documents } < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
 """
 

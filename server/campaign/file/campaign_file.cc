@@ -14,6 +14,8 @@
 #include "dem/registry/scenario_problems.h"
 #include "server/campaign/checks/campaign_warnings.h"
 #include "server/campaign/checks/grain_check.h"
+#include "server/campaign/checks/setting_ends.h"
+#include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_experiment.h"
 #include "server/campaign/file/read_inference.h"
@@ -193,7 +195,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
                          CampaignIs is, const ReadLimits& limits) {
   ReadOutcome outcome;
   ProblemList problems(file_name);
-  const YamlParse parse = ParseYaml(yaml_text);
+  YamlParse parse = ParseYaml(yaml_text);
   if (parse.error) {
     problems.Add(parse.error->line, "", parse.error->message);
     outcome.problems = problems.Sorted();
@@ -208,14 +210,19 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadModel(map, context, campaign);
     ReadInference(map, campaign);
     const std::size_t sound = problems.size();
-    ReadParameters(map, campaign);
+    ReadParameters(map, is_new, campaign);
     if (problems.size() == sound) {
       ReadJointPrior(map, campaign);
+      if (is_new && problems.size() == sound) CheckTied(map, campaign);
     } else {
       map.Ignore({"prior_correlation", "constraints"});  // of parameters that could not be read
     }
     CheckSamples(map, campaign);
     ReadStart(map, campaign);
+    if (problems.size() == sound) {
+      StateNominalDensity(*parse.root, campaign);
+      StateNominalValues(*parse.root, campaign);
+    }
     const std::size_t before = problems.size();
     ReadExperiments(map, context, campaign);
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
@@ -239,6 +246,11 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
       AskEngine(map, campaign, {});
       for (const std::string& effect : campaign.race) {
         if (problems.size() == 0) AskEngine(map, campaign, {effect});
+      }
+      for (const ImpossibleEnd& end : ImpossibleEnds(campaign)) {
+        if (problems.size() > 0) break;
+        const std::string key = absl::StrCat("parameters.", end.parameter);
+        problems.Add(map.LineOf("parameters"), key, end.problem, "impossible");
       }
     }
   }

@@ -214,6 +214,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
     }
   }
   experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
+  map.TextList("as_stated");  // read with the parameters
   if (campaign.program) {
     experiment.specimen_grains = map.Quantity("specimen_grains");
   } else if (campaign.precomputed) {

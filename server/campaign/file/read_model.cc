@@ -4,11 +4,14 @@
 #include <array>
 #include <cmath>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "dem/model/model.h"
 #include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
 #include "dem/registry/model_parameters.h"
+#include "server/campaign/file/parameters/setting_names.h"
+#include "server/campaign/file/parameters/tied_check.h"
 #include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_materials.h"
 #include "server/campaign/file/shared/read_prior.h"
@@ -76,7 +79,8 @@ bool Joins(const dem::EffectInfo& effect, const std::string& contact) {
              effect.contacts.end();
 }
 
-std::string UnknownParameter(const std::string& name, const dem::Model& model) {
+std::string UnknownParameter(const std::string& name, const dem::Model& model,
+                             const std::vector<ExperimentOutline>& experiments = {}) {
   std::string message = absl::StrCat("is not a parameter of ", model.contact,
                                      model.effects.empty() ? "" : " with " + Listed(model.effects));
   const std::size_t dot = name.find('.');
@@ -85,7 +89,18 @@ std::string UnknownParameter(const std::string& name, const dem::Model& model) {
       std::find(model.effects.begin(), model.effects.end(), effect) == model.effects.end()) {
     return absl::StrCat(message, "; add ", effect, " to model.effects to use it");
   }
-  return absl::StrCat(message, "; ", Suggestion(name, NamesOf(ParametersOf(model))));
+  std::vector<std::string> names = NamesOf(ParametersOf(model));
+  const std::vector<std::string> settings = SettingNames(experiments);
+  if (!settings.empty() && Nearest(name, names).empty()) {
+    absl::StrAppend(&message, " nor a setting of an experiment");
+    const std::string meant = Nearest(name, settings);
+    for (const std::string& setting : settings) {
+      if (!meant.empty() ? setting == meant : !absl::StrContains(setting, '.')) {
+        names.push_back(setting);
+      }
+    }
+  }
+  return absl::StrCat(message, "; ", Suggestion(name, names));
 }
 
 // An effect that cannot join the contact has been refused already, and asks for no values.
@@ -172,16 +187,16 @@ void ReadFixed(MapReader& map, dem::Model& model) {
   fixed->Finish();
 }
 
-// Bounds of the prior against the catalogue; unbounded priors are cut off at the admissible range.
-void HoldToAdmissible(const dem::ParameterInfo& info, const std::string& unit,
-                      const std::string& key, MapReader& parameters, inference::Prior& prior) {
-  if (std::isinf(prior.min)) prior.min = info.min;
-  if (std::isinf(prior.max)) prior.max = info.max;
-  const Range range = AdmissibleRange(info);
-  const bool low = prior.min < info.min || (info.min_open && prior.min <= info.min &&
-                                            prior.kind != inference::PriorKind::kNormal &&
-                                            prior.kind != inference::PriorKind::kLogNormal);
-  if (low || prior.max > info.max) {
+// Bounds of the prior against what is admissible; unbounded priors are cut off there.
+void HoldToAdmissible(const Range& range, const std::string& unit, const std::string& key,
+                      MapReader& parameters, inference::Prior& prior) {
+  if (std::isinf(prior.min)) prior.min = range.min;
+  if (std::isinf(prior.max)) prior.max = range.max;
+  const bool normal =
+      prior.kind == inference::PriorKind::kNormal || prior.kind == inference::PriorKind::kLogNormal;
+  const bool low = prior.min < range.min || (range.min_open && prior.min <= range.min && !normal);
+  const bool high = prior.max > range.max || (range.max_open && prior.max >= range.max && !normal);
+  if (low || high) {
     parameters.Problem(key, absl::StrCat("the prior from ", prior.min, " to ", prior.max,
                                          " leaves what is admissible: ", range.Describe(unit)));
     return;
@@ -200,20 +215,84 @@ const dem::ParameterInfo* DeclaredParameter(const Campaign& campaign, const std:
   return nullptr;
 }
 
-void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign) {
+// What the parameters may be of beside the model.
+struct OtherSources {
+  std::vector<ExperimentOutline> experiments;
+  bool derived = false;  // from a campaign whose experiments may be no more
+};
+
+// The prior of a setting, or what it is tied to; of one that a derived campaign has no more, what
+// its numbers say.
+void ReadSetting(MapReader& parameters, const SettingNamed& named, CalibratedParameter parameter,
+                 Campaign& campaign, std::vector<TieAsWritten>& ties) {
+  const std::string& name = parameter.name;
+  const YamlNode& node = *parameters.Find(name);
+  const std::string path = parameters.PathOf(name);
+  parameter.setting = named.setting.value_or(SettingOf{});
+  parameter.unit = named.unit;
+  if (IsTied(node)) {
+    ties.push_back({.name = name,
+                    .unit = parameter.unit,
+                    .range = parameter.setting->range,
+                    .text = ReadTie(node, path, parameters.problems()).value_or(""),
+                    .setting = parameter.setting});
+    return;
+  }
+  const auto prior =
+      named.setting
+          ? ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)
+          : ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance);
+  if (prior) {
+    parameter.prior = *prior;
+    if (named.setting) {
+      HoldToAdmissible(named.setting->range, parameter.unit, name, parameters, parameter.prior);
+    }
+  }
+  campaign.parameters.push_back(std::move(parameter));
+}
+
+// A parameter of a program is whatever its prior says.
+void ReadProgramParameter(MapReader& parameters, CalibratedParameter parameter, Campaign& campaign,
+                          std::vector<TieAsWritten>& ties) {
+  const std::string name = parameter.name;
+  const YamlNode& node = *parameters.Find(name);
+  const std::string path = parameters.PathOf(name);
+  const dem::ParameterInfo* declared = DeclaredParameter(campaign, name);
+  if (IsTied(node)) {
+    ties.push_back({.name = name,
+                    .unit = declared != nullptr ? declared->unit : "",
+                    .range = {},
+                    .text = ReadTie(node, path, parameters.problems()).value_or(""),
+                    .setting = std::nullopt});
+    return;
+  }
+  // What an effect's declaration says of its unit holds where these numbers have none.
+  const bool as_declared = declared != nullptr && UnitOfPrior(node) == "1";
+  if (as_declared) parameter.unit = declared->unit;
+  const auto prior =
+      as_declared
+          ? ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)
+          : ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance);
+  if (prior) parameter.prior = *prior;
+  campaign.parameters.push_back(std::move(parameter));
+}
+
+void ReadOne(MapReader& parameters, const std::string& name, const OtherSources& others,
+             Campaign& campaign, std::vector<TieAsWritten>& ties) {
   const YamlNode& node = *parameters.Find(name);
   const std::string path = parameters.PathOf(name);
   CalibratedParameter parameter{.name = name, .unit = "", .prior = {}};
-  if (campaign.precomputed || campaign.program) {
-    // What an effect's declaration says of its unit holds where these numbers have none.
-    const dem::ParameterInfo* declared = DeclaredParameter(campaign, name);
-    if (declared != nullptr && UnitOfPrior(node) == "1") {
-      parameter.unit = declared->unit;
-      if (const auto prior = ReadPrior(node, path, parameter.unit, parameters.problems())) {
-        parameter.prior = *prior;
-      }
-    } else if (const auto prior =
-                   ReadFreePrior(node, path, parameters.problems(), parameter.unit)) {
+  if (campaign.precomputed && IsTied(node)) {
+    parameters.Problem(name, "cannot be tied: runs made elsewhere have a value of each parameter");
+    return;
+  }
+  if (campaign.program) {
+    ReadProgramParameter(parameters, std::move(parameter), campaign, ties);
+    return;
+  }
+  if (campaign.precomputed) {
+    if (const auto prior =
+            ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance)) {
       parameter.prior = *prior;
     }
     campaign.parameters.push_back(parameter);
@@ -223,29 +302,54 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
   const bool is_design = campaign.method == Method::kDesign;
   const dem::ParameterInfo* info = is_design ? FindNumerics(name) : nullptr;
   if (info == nullptr) info = dem::FindParameter(model, name);
+  SettingNamed named = FindSetting(name, others.experiments);
+  if (info != nullptr && named.setting) {
+    named.problem = absl::StrCat("has two meanings, the parameter of the model and ", named.meaning,
+                                 "; the setting of one is called EXPERIMENT.", name);
+  }
+  if (!named.problem.empty()) {
+    parameters.Problem(name, named.problem);
+    return;
+  }
+  if (named.setting || (info == nullptr && others.derived)) {
+    ReadSetting(parameters, named, std::move(parameter), campaign, ties);
+    return;
+  }
   if (info == nullptr) {
-    if (!model.contact.empty()) parameters.Problem(name, UnknownParameter(name, model));
+    if (!model.contact.empty()) {
+      parameters.Problem(name, UnknownParameter(name, model, others.experiments));
+    }
     return;
   }
   parameter.unit = dem::UnitFor(*info, campaign.model.contact);
+  if (IsTied(node)) {
+    ties.push_back({.name = name,
+                    .unit = parameter.unit,
+                    .range = AdmissibleRange(*info),
+                    .text = ReadTie(node, path, parameters.problems()).value_or("")});
+    return;
+  }
   if (node.kind == YamlNode::Kind::kScalar && node.scalar == "default") {
     parameter.prior.kind = info->default_prior.kind == "log_uniform"
                                ? inference::PriorKind::kLogUniform
                                : inference::PriorKind::kUniform;
     parameter.prior.min = info->default_prior.min;
     parameter.prior.max = info->default_prior.max;
-  } else if (const auto prior = ReadPrior(node, path, parameter.unit, parameters.problems())) {
+  } else if (const auto prior = ReadPriorOf(node, path, parameter.unit, parameters.problems(),
+                                            parameter.nuisance)) {
     parameter.prior = *prior;
-    HoldToAdmissible(*info, parameter.unit, name, parameters, parameter.prior);
+    HoldToAdmissible(AdmissibleRange(*info), parameter.unit, name, parameters, parameter.prior);
   }
   campaign.parameters.push_back(parameter);
 }
 
-void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
+void CheckSources(const MapReader& campaign_map, const Campaign& campaign,
+                  const std::vector<TieAsWritten>& ties) {
   const dem::Model model = ModelWithRace(campaign);
-  const auto calibrated = [&campaign](const std::string& name) {
-    return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
-                       [&name](const CalibratedParameter& p) { return p.name == name; });
+  const auto calibrated = [&](const std::string& name) {
+    const auto is_it = [&name](const auto& p) { return p.name == name; };
+    return std::any_of(campaign.parameters.begin(), campaign.parameters.end(), is_it) ||
+           std::any_of(ties.begin(), ties.end(), is_it);
   };
   const auto fixed = [&](const std::string& name) {
     return model.parameters.contains(name) || model.parameters.contains(InOtherOrder(model, name));
@@ -295,6 +399,12 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
 constexpr std::array kProgramKeys = {"command", "files",      "templates", "keep",    "checkpoint",
                                      "states",  "persistent", "limits",    "version", "numerics"};
 
+SayOfTied SayAt(const MapReader& parameters) {
+  return [&parameters](const std::string& name, const std::string& message) {
+    parameters.Problem(name, message);
+  };
+}
+
 }  // namespace
 
 void ReadModel(MapReader& campaign_map, ReadContext& context, Campaign& campaign) {
@@ -337,7 +447,7 @@ void ReadModel(MapReader& campaign_map, ReadContext& context, Campaign& campaign
   map.Finish();
 }
 
-void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
+void ReadParameters(MapReader& campaign_map, bool is_new, Campaign& campaign) {
   if (campaign_map.Require("parameters", "it names what is calibrated, each with its prior") ==
       nullptr) {
     return;
@@ -347,18 +457,41 @@ void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
   if (parameters->Keys().empty()) {
     campaign_map.Problem("parameters", "is empty; at least one parameter has to be calibrated");
   }
+  const std::size_t before = campaign_map.problems().size();
+  OtherSources others;
+  if (!campaign.model.contact.empty()) {  // of runs that this program's DEM makes
+    others = {.experiments = OutlinesOf(campaign_map.Find("experiments")),
+              .derived = campaign_map.Has("lineage")};
+    if (is_new) CheckExperimentNames(others.experiments, campaign, campaign_map.problems());
+  }
   std::vector<std::string> seen;
+  std::vector<TieAsWritten> ties;
   for (const std::string& name : parameters->Keys()) {
     if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
       continue;  // Finish() reports doubles
     }
     seen.push_back(name);
-    ReadOne(*parameters, name, campaign);
+    ReadOne(*parameters, name, others, campaign, ties);
   }
   parameters->Finish();
   if (!campaign.precomputed && !campaign.program && !campaign.model.contact.empty()) {
-    CheckSources(campaign_map, campaign);
+    CheckSources(campaign_map, campaign, ties);
   }
+  if (campaign_map.problems().size() > before) return;
+  if (!ties.empty() && campaign.parameters.empty()) {
+    campaign_map.Problem("parameters", "are all tied; at least one has to be calibrated");
+    return;
+  }
+  TieParameters(ties, campaign, SayAt(*parameters));
+  for (const SetTwice& twice : NumbersSetTwice(campaign)) {
+    parameters->Problem(twice.name, twice.problem);
+  }
+}
+
+void CheckTied(MapReader& campaign_map, const Campaign& campaign) {
+  if (campaign.tied.empty()) return;
+  const auto parameters = campaign_map.Map("parameters");
+  CheckTiedValues(campaign, SayAt(*parameters));
 }
 
 }  // namespace calib::campaign

@@ -48,6 +48,8 @@ Section ExperimentKeys() {
            "a setting of the test, e.g. `confining_pressure`"},
           {"role", OneWord(kRoleWords), WordOf(kRoleWords, Role::kCalibrate),
            "`validate` is never fitted, reported as held-out error"},
+          {"as_stated", OneOrMore(Text()), "nothing",
+           "settings that no parameter changes here; `predict` writes what stands in its test"},
           {"packing", MapOf("packing"), "required where the test needs one", "the specimen"},
           {"settings", MapOf("told_settings"), "none", "what a program (`command`) is told"},
           {"realizations", AnyOf({Whole(1, 1000), MapOf("told_realizations")}),

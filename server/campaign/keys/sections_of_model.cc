@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
@@ -124,27 +125,42 @@ Section Pair() {
 Section Parameters() {
   return {"parameters",
           "parameters",
-          {{"NAME", AnyOf({OneWord({"default"}), MapOf("prior")}), "",
-            "prior of a parameter of the model; default: the catalogue's"}},
+          {{"NAME", AnyOf({OneWord({"default"}), MapOf("parameter"), MapOf("tie")}), "",
+            "prior of a parameter of the model or of a setting, or what it follows from; default: "
+            "the catalogue's",
+            "`NAME` of the model, `[EXPERIMENT.]SETTING`, `[EXPERIMENT.]GROUP.KEY`"}},
           ParametersOffered()};
 }
 
-Section PriorKeys() {
-  return {"prior",
-          "parameters.NAME",
-          {
-              {"prior", OneWord(kPriorWords), kRequired, "the family"},
-              {"min", NumberOfCatalogue(), "as admissible; uniform, log_uniform: required",
-               "lower bound; above 0 for log_uniform"},
-              {"max", NumberOfCatalogue(), "as admissible; uniform, log_uniform: required",
-               "upper bound"},
-              {"mean", NumberOfCatalogue(), "normal, log_normal: required",
-               "mean of a normal; the *median*, in units, of a log_normal"},
-              {"sd", NumberOfCatalogue(), "normal, log_normal: required",
-               "standard deviation; of a log_normal that of ln x, a plain number"},
-              {"unit", Text(), "that of the numbers",
-               "of the numbers; with `precomputed`, `command` only"},
-          }};
+std::vector<Key> KeysOfPrior() {
+  return {
+      {"prior", OneWord(kPriorWords), kRequired, "the family"},
+      {"min", NumberOfCatalogue(), "as admissible; uniform, log_uniform: required",
+       "lower bound; above 0 for log_uniform"},
+      {"max", NumberOfCatalogue(), "as admissible; uniform, log_uniform: required", "upper bound"},
+      {"mean", NumberOfCatalogue(), "normal, log_normal: required",
+       "mean of a normal; the *median*, in units, of a log_normal"},
+      {"sd", NumberOfCatalogue(), "normal, log_normal: required",
+       "standard deviation; of a log_normal that of ln x, a plain number"},
+      {"unit", Text(), "that of the numbers", "of the numbers; with `precomputed`, `command` only"},
+  };
+}
+
+Section PriorKeys() { return {"prior", "user_effects[].parameters.NAME.prior", KeysOfPrior()}; }
+
+Section ParameterKeys() {
+  std::vector<Key> keys = KeysOfPrior();
+  keys.push_back({"nuisance", TrueOrFalse(), "false",
+                  "it is inferred, and not reported among what is wanted"});
+  return {"parameter", "parameters.NAME", std::move(keys)};
+}
+
+Section Tie() {
+  return {"tie",
+          "parameters.NAME, tied",
+          {{"equal_to", Text(), kRequired,
+            "another parameter, calibrated, fixed or tied, or a formula of several, in SI",
+            "`NAME`, or e.g. `2 * NAME + OTHER`"}}};
 }
 
 Section PrecomputedKeys() {
@@ -227,20 +243,10 @@ Section ProgramNumber() {
 }  // namespace
 
 std::vector<Section> SectionsOfModel() {
-  return {Model(),
-          Fixed(),
-          Parameters(),
-          PriorKeys(),
-          Materials(),
-          Material(),
-          Pairs(),
-          Pair(),
-          PrecomputedKeys(),
-          HeldEffects(),
-          HeldEffect(),
-          ProgramStates(),
-          ProgramLimitKeys(),
-          ProgramNumericsKeys(),
+  return {Model(),         Fixed(),         Parameters(),       PriorKeys(),
+          ParameterKeys(), Tie(),           Materials(),        Material(),
+          Pairs(),         Pair(),          PrecomputedKeys(),  HeldEffects(),
+          HeldEffect(),    ProgramStates(), ProgramLimitKeys(), ProgramNumericsKeys(),
           ProgramNumber()};
 }
 

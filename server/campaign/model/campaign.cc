@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/campaign/model/race.h"
+#include "server/campaign/model/run_settings.h"
 
 namespace calib::campaign {
 
@@ -215,7 +216,8 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   scenario.staging = experiment.staging;
   scenario.path = experiment.path;
   scenario.seed = campaign.seed + static_cast<std::uint64_t>(run.stream);
-  ChangeNumerics(campaign, experiment, run.values, scenario);
+  ChangeSettings(campaign, experiment, run.values, scenario);
+  ChangeNumerics(campaign, experiment, run, scenario);
   return scenario;
 }
 

@@ -17,6 +17,7 @@
 #include "inference/prior/joint_prior.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "server/campaign/model/program.h"
+#include "server/campaign/model/tied_parameters.h"
 #include "server/campaign/model/words.h"
 
 namespace calib::campaign {
@@ -25,6 +26,8 @@ struct CalibratedParameter {
   std::string name;  ///< dotted
   std::string unit;  ///< SI, for display
   inference::Prior prior;
+  bool nuisance = false;               ///< inferred, and not reported among what is wanted
+  std::optional<SettingOf> setting{};  ///< empty: a parameter of the model
 };
 
 /// Stated error of a reading as a function of what is read: sd = absolute, or
@@ -238,6 +241,8 @@ struct Campaign {
   /// In place of the DEM; its effects are declared in model.user_effects, without a formula.
   std::optional<Program> program;
   std::vector<CalibratedParameter> parameters;
+  /// Parameters that follow from these and the fixed ones, each behind those that it follows from.
+  std::vector<TiedParameter> tied{};
   /// Where correlations or constraints tie them; their priors are its marginals.
   std::optional<inference::JointPrior> tied_prior;
   std::vector<Experiment> experiments;
@@ -323,7 +328,8 @@ struct RunOf {
 };
 
 /// The scenario of one evaluation; of a design without the effects that stand at their null
-/// (race.h). With a recipe the packing is left empty for the worker to generate.
+/// (race.h), with the settings that are calibrated (run_settings.h). With a recipe the packing is
+/// left empty for the worker to generate.
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
                            const RunOf& run);
 

@@ -29,10 +29,11 @@ bool IsPlane(const Experiment& experiment) {
 }
 
 bool IsCalibrated(const Campaign& campaign, const std::string& effect) {
-  return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
-                     [prefix = effect + "."](const CalibratedParameter& parameter) {
-                       return absl::StartsWith(parameter.name, prefix);
-                     });
+  const auto of_effect = [prefix = effect + "."](const auto& parameter) {
+    return absl::StartsWith(parameter.name, prefix);
+  };
+  return std::any_of(campaign.parameters.begin(), campaign.parameters.end(), of_effect) ||
+         std::any_of(campaign.tied.begin(), campaign.tied.end(), of_effect);
 }
 
 }  // namespace

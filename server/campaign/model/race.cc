@@ -13,6 +13,8 @@
 #include "dem/registry/declared_effects.h"
 #include "dem/registry/model_parameters.h"
 #include "server/campaign/model/excitation.h"
+#include "server/campaign/model/run_settings.h"
+#include "server/campaign/model/tied_parameters.h"
 
 namespace calib::campaign {
 namespace {
@@ -70,11 +72,14 @@ bool HasClumps(const Experiment& experiment) {
 
 // Mean diameter of the grains of the first specimen [m], as the engine takes it. Precondition: the
 // test needs a packing.
-double MeanDiameter(const Experiment& experiment) {
+double MeanDiameter(const Campaign& campaign, const Experiment& experiment,
+                    const std::vector<double>& values) {
   const Specimen& first = experiment.specimens.front();
   const auto* file = std::get_if<PackingFile>(&first);
-  const std::vector<double> radii =
-      file != nullptr ? file->packing.radius : dem::RadiiOf(std::get<dem::PackingRecipe>(first));
+  const auto changed = ChangedRecipe(campaign, experiment, {.values = values, .stream = 0});
+  const std::vector<double> radii = file != nullptr ? file->packing.radius
+                                    : changed       ? dem::RadiiOf(*changed)
+                                              : dem::RadiiOf(std::get<dem::PackingRecipe>(first));
   return 2 * std::accumulate(radii.begin(), radii.end(), 0.0) / static_cast<double>(radii.size());
 }
 
@@ -148,21 +153,28 @@ dem::Model ModelOf(const Campaign& campaign, std::span<const double> values) {
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const std::string& name = campaign.parameters[j].name;
     const std::string effect = EffectNamedIn(name);
-    const bool absent = is_design && (FindNumerics(name) != nullptr ||
-                                      (IsOneOf(campaign.race, effect) && !IsOneOf(active, effect)));
+    const bool absent =
+        campaign.parameters[j].setting ||
+        (is_design && (FindNumerics(name) != nullptr ||
+                       (IsOneOf(campaign.race, effect) && !IsOneOf(active, effect))));
     if (!absent) model.parameters[name] = values[j];
+  }
+  const std::vector<double> tied = TiedValues(campaign, values);
+  for (std::size_t k = 0; k < tied.size(); ++k) {
+    if (!campaign.tied[k].setting) model.parameters[campaign.tied[k].name] = tied[k];
   }
   return model;
 }
 
-void ChangeNumerics(const Campaign& campaign, const Experiment& experiment,
-                    std::span<const double> values, dem::Scenario& scenario) {
+void ChangeNumerics(const Campaign& campaign, const Experiment& experiment, const RunOf& run,
+                    dem::Scenario& scenario) {
+  const std::vector<double>& values = run.values;
   if (campaign.method != Method::kDesign || !ReadAtRest(experiment)) return;
   std::optional<dem::Staging> used;
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const dem::ParameterInfo* factor = FindNumerics(campaign.parameters[j].name);
     if (factor == nullptr || values[j] == *factor->null_value) continue;
-    if (!used) used = dem::ResolveStaging(scenario, MeanDiameter(experiment));
+    if (!used) used = dem::ResolveStaging(scenario, MeanDiameter(campaign, experiment, values));
     if (factor->name == "rate") scenario.staging.rate = *used->rate * values[j];
     if (factor->name == "step") scenario.staging.step = *used->step * values[j];
     if (factor->name == "damping") {

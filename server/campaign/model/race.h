@@ -44,10 +44,10 @@ std::vector<std::string> ActiveEffects(const Campaign& campaign, std::span<const
 /// Contact law, effects and parameters of a run. values: likewise.
 dem::Model ModelOf(const Campaign& campaign, std::span<const double> values);
 
-/// Applies what values say of the numerics to the scenario of an experiment that has everything
-/// else but its packing.
-void ChangeNumerics(const Campaign& campaign, const Experiment& experiment,
-                    std::span<const double> values, dem::Scenario& scenario);
+/// Applies what a run's values say of the numerics to the scenario of an experiment that has
+/// everything else but its packing.
+void ChangeNumerics(const Campaign& campaign, const Experiment& experiment, const RunOf& run,
+                    dem::Scenario& scenario);
 
 /// Why these effects cannot join the model in one run, in a sentence; empty: they can.
 std::string WhyNotTogether(const Campaign& campaign, const std::vector<std::string>& effects);

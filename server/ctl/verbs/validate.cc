@@ -1,10 +1,12 @@
 #include <iostream>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
 #include "server/campaign/checks/experiment_summary.h"
 #include "server/campaign/checks/warning.h"
+#include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
@@ -74,13 +76,15 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
   const auto source = ReadSourceFiles(options.file, std::nullopt, common.json);
   if (!source) return kBadInput;
   const campaign::Campaign& campaign = source->outcome.campaign;
-  const std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
+  std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
+  for (std::string& note : campaign::ParameterNotes(campaign)) notes.push_back(std::move(note));
   std::vector<campaign::ExperimentSummary> summaries;
   for (const campaign::Experiment& experiment : campaign.experiments) {
     summaries.push_back(campaign::SummaryOf(experiment));
   }
   if (common.json) {
-    std::cout << report::ProblemsJson({}, source->outcome.warnings, notes, summaries);
+    std::cout << report::ProblemsJson({}, source->outcome.warnings, notes, summaries,
+                                      campaign::CalibratableIn(source->yaml, campaign));
     return kDone;
   }
   std::size_t readings = 0;

@@ -81,13 +81,24 @@ Json Emulator(const v1::Posterior& p) {
 
 // The posterior along the readings: means and coefficients of variation in the order of the
 // parameters.
-Json Path(const google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>& points) {
+// order: places of the parameters.
+std::vector<double> InOrder(const google::protobuf::RepeatedField<double>& values,
+                            const std::vector<int>& order) {
+  if (values.size() != static_cast<int>(order.size())) return {values.begin(), values.end()};
+  std::vector<double> ordered;
+  ordered.reserve(order.size());
+  for (const int place : order) ordered.push_back(values.Get(place));
+  return ordered;
+}
+
+Json Path(const google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>& points,
+          const std::vector<int>& order) {
   Json path = Json::array();
   for (const auto& point : points) {
     path.push_back({{"experiment", point.experiment()},
                     {"load_step", point.load_step()},
-                    {"mean", std::vector<double>(point.mean().begin(), point.mean().end())},
-                    {"cov", std::vector<double>(point.cov().begin(), point.cov().end())},
+                    {"mean", InOrder(point.mean(), order)},
+                    {"cov", InOrder(point.cov(), order)},
                     {"ess", point.ess()}});
   }
   return path;
@@ -129,6 +140,14 @@ Json PosteriorFields(const v1::Posterior& p,
                      std::span<const campaign::CalibratedParameter> campaign_parameters,
                      const PosteriorShape& shape) {
   Json parameters = Json::object();
+  Json nuisance = Json::object();
+  // Whatever has a place per parameter is in the order of these two: the wanted come first.
+  std::vector<int> order;
+  for (const bool wanted : {true, false}) {
+    for (int j = 0; j < p.parameters_size(); ++j) {
+      if (p.parameters(j).nuisance() != wanted) order.push_back(j);
+    }
+  }
   const auto bound = [&](const std::string& name, double inference::Prior::*end,
                          double shown) -> Json {
     for (const campaign::CalibratedParameter& one : campaign_parameters) {
@@ -137,23 +156,25 @@ Json PosteriorFields(const v1::Posterior& p,
     return shown;
   };
   for (const auto& q : p.parameters()) {
-    parameters[q.name()] = {{"mean", q.mean()},
-                            {"sd", q.sd()},
-                            {"cov", q.cov()},
-                            {"q05", q.q05()},
-                            {"q50", q.q50()},
-                            {"q95", q.q95()},
-                            {"unit", q.unit()},
-                            {"at_bound", q.at_bound()},
-                            {"prior_min", bound(q.name(), &inference::Prior::min, q.prior_min())},
-                            {"prior_max", bound(q.name(), &inference::Prior::max, q.prior_max())},
-                            {"conditioned_on", q.conditioned_on()},
-                            {"split_half", q.split_half()},
-                            {"prior_density", nullptr},
-                            {"density", nullptr}};
+    (q.nuisance() ? nuisance : parameters)[q.name()] = {
+        {"mean", q.mean()},
+        {"sd", q.sd()},
+        {"cov", q.cov()},
+        {"q05", q.q05()},
+        {"q50", q.q50()},
+        {"q95", q.q95()},
+        {"unit", q.unit()},
+        {"at_bound", q.at_bound()},
+        {"prior_min", bound(q.name(), &inference::Prior::min, q.prior_min())},
+        {"prior_max", bound(q.name(), &inference::Prior::max, q.prior_max())},
+        {"conditioned_on", q.conditioned_on()},
+        {"split_half", q.split_half()},
+        {"prior_density", nullptr},
+        {"density", nullptr}};
   }
   for (std::size_t j = 0; j < shape.parameters.size(); ++j) {
-    Json& parameter = parameters[shape.parameters[j]];
+    const std::string& name = shape.parameters[j];
+    Json& parameter = (nuisance.contains(name) ? nuisance : parameters)[name];
     parameter["prior_density"] = Pairs(shape.prior[j]);
     parameter["density"] = Pairs(shape.density[j]);
   }
@@ -169,7 +190,8 @@ Json PosteriorFields(const v1::Posterior& p,
   const int d = p.parameters_size();
   for (int i = 0; i < d && p.correlation_size() == d * d; ++i) {
     Json row = Json::array();
-    for (int j = 0; j < d; ++j) row.push_back(p.correlation(i * d + j));
+    const int place = order[static_cast<std::size_t>(i)];
+    for (const int j : order) row.push_back(p.correlation(place * d + j));
     correlation.push_back(std::move(row));
   }
   Json warnings = Json::array();
@@ -181,6 +203,7 @@ Json PosteriorFields(const v1::Posterior& p,
           {"log_evidence", p.log_evidence()},
           {"log_evidence_se", p.log_evidence_se()},
           {"parameters", parameters},
+          {"nuisance_parameters", nuisance},
           {"correlation", correlation},
           {"ess", p.ess()},
           {"pareto_k", p.pareto_k()},
@@ -190,8 +213,8 @@ Json PosteriorFields(const v1::Posterior& p,
           {"noise", p.noise()},
           {"noise_scale", noise_scale},
           {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
-          {"path", Path(p.path())},
-          {"reversed_path", Path(p.reversed_path())},
+          {"path", Path(p.path(), order)},
+          {"reversed_path", Path(p.reversed_path(), order)},
           {"model_evaluations", p.model_evaluations()},
           {"stopped_early", p.stopped_early()},
           {"stated_loss", p.stated_loss()},

@@ -8,6 +8,7 @@
 #include "dem/formula/user_effect.h"
 #include "server/campaign/checks/experiment_summary.h"
 #include "server/campaign/checks/warning.h"
+#include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/file/text/problem_list.h"
 #include "server/campaign/model/campaign.h"
 #include "server/report/views/campaign_view.h"
@@ -56,11 +57,13 @@ std::string StatesJson(const std::string& campaign, int sample,
 std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
 /// What `validate` answers: problems, or of a campaign that is valid warnings, notes on what
-/// follows without being said, and what was read of each experiment, in people's units.
+/// follows without being said, what was read of each experiment, in people's units, and the names
+/// that its parameters may have.
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
                          const std::vector<campaign::Warning>& warnings = {},
                          const std::vector<std::string>& notes = {},
-                         const std::vector<campaign::ExperimentSummary>& experiments = {});
+                         const std::vector<campaign::ExperimentSummary>& experiments = {},
+                         const std::vector<campaign::Calibratable>& calibratable = {});
 /// The measurements as compared: SI, logarithmic strains, standard deviations.
 std::string DataJson(const campaign::Campaign& campaign);
 

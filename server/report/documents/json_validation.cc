@@ -57,7 +57,8 @@ Json SummaryJson(const campaign::ExperimentSummary& summary) {
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
                          const std::vector<campaign::Warning>& warnings,
                          const std::vector<std::string>& notes,
-                         const std::vector<campaign::ExperimentSummary>& experiments) {
+                         const std::vector<campaign::ExperimentSummary>& experiments,
+                         const std::vector<campaign::Calibratable>& calibratable) {
   Json wrong = Json::array();
   for (const campaign::Problem& p : problems) {
     wrong.push_back({{"file", p.file},
@@ -77,11 +78,16 @@ std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
   for (const campaign::ExperimentSummary& experiment : experiments) {
     read.push_back(SummaryJson(experiment));
   }
-  const Json answer = {{"valid", problems.empty()},
-                       {"problems", wrong},
-                       {"warnings", odd},
-                       {"notes", notes},
-                       {"experiments", read}};
+  Json names = Json::array();
+  for (const campaign::Calibratable& one : calibratable) {
+    names.push_back({{"name", one.name},
+                     {"unit", one.unit},
+                     {"experiments", one.experiments},
+                     {"meaning", one.meaning}});
+  }
+  const Json answer = {{"valid", problems.empty()}, {"problems", wrong},
+                       {"warnings", odd},           {"notes", notes},
+                       {"experiments", read},       {"calibratable", names}};
   return answer.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -46,7 +46,7 @@ std::string Cell(double value, int digits) {
 std::string LatexTable(const CampaignView& view) {
   std::string rows;
   for (const auto& p : view.posterior.parameters()) {
-    if (p.conditioned_on()) continue;
+    if (p.conditioned_on() || p.nuisance()) continue;
     const DisplayUnit unit = UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
     const auto cell = [&unit](double value, int digits) {
       return Cell(value * unit.factor, digits);

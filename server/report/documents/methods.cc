@@ -194,9 +194,13 @@ Methods MethodsOf(const CampaignView& view) {
   say(ModelSentence(campaign, cited));
   std::vector<std::string> priors;
   for (const auto& p : campaign.parameters) {
-    priors.push_back(NameForPeople(p.name) + " (" + PriorInWords(p) + ")");
+    priors.push_back(NameForPeople(p.name) + " (" + PriorInWords(p) +
+                     (p.nuisance ? "; nuisance)" : ")"));
   }
   if (!priors.empty()) say("Calibrated, with these priors: " + Listed(priors) + ".");
+  std::vector<std::string> tied;
+  for (const auto& t : campaign.tied) tied.push_back(NameForPeople(t.name) + " = " + t.text);
+  if (!tied.empty()) say("Tied to others: " + Listed(tied) + ".");
   std::vector<std::string> fixed;
   for (const auto& [name, value] : campaign.model.parameters) {
     fixed.push_back(NameForPeople(name) + " = " + Number(value));

@@ -27,6 +27,25 @@ TEST(Json, PosteriorHasTheFieldsOfTheInterface) {
   EXPECT_EQ(p["mean"].get<double>(), view.posterior.parameters(0).mean());  // bit for bit
 }
 
+TEST(Json, NuisanceParametersStandApartAndLast) {
+  v1::Posterior posterior;
+  for (const char* name : {"a", "pressure", "b"}) {
+    v1::Posterior::Parameter& parameter = *posterior.add_parameters();
+    parameter.set_name(name);
+    parameter.set_nuisance(std::string(name) == "pressure");
+  }
+  for (const double r : {1.0, 0.1, 0.2, 0.1, 1.0, 0.3, 0.2, 0.3, 1.0}) posterior.add_correlation(r);
+  v1::Posterior::PathPoint& point = *posterior.add_path();
+  for (const double mean : {1, 2, 3}) point.add_mean(mean);
+  const Json json = Json::parse(PosteriorJson(posterior));
+  EXPECT_EQ(json["parameters"].size(), 2U);
+  EXPECT_FALSE(json["parameters"].contains("pressure"));
+  EXPECT_EQ(json["nuisance_parameters"].size(), 1U);
+  EXPECT_TRUE(json["nuisance_parameters"]["pressure"].contains("q95"));
+  EXPECT_EQ(json["correlation"], Json({{1.0, 0.2, 0.1}, {0.2, 1.0, 0.3}, {0.1, 0.3, 1.0}}));
+  EXPECT_EQ(json["path"][0]["mean"], Json({1.0, 3.0, 2.0}));
+}
+
 TEST(Json, ABoundThatThePriorDoesNotHaveIsNull) {
   CampaignView view = testing::ExampleView("x");
   view.campaign.parameters[0].prior.max = HUGE_VAL;

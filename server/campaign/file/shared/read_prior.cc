@@ -1,5 +1,6 @@
 #include "server/campaign/file/shared/read_prior.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -14,6 +15,8 @@ namespace {
 
 using inference::Prior;
 using inference::PriorKind;
+
+constexpr const char* kEqualTo = "equal_to";
 
 // A number that has to be there; NaN after a problem.
 double Required(MapReader& map, const std::string& key, const std::string& unit, const Range& range,
@@ -137,10 +140,40 @@ std::optional<Prior> ReadPrior(const YamlNode& node, const std::string& path,
   return node.kind == YamlNode::Kind::kMap ? ReadFrom(map, si_unit) : std::nullopt;
 }
 
-std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
-                                   ProblemList& problems, std::string& si_unit) {
-  MapReader map(node, path, SectionOf("prior"), problems);
+bool IsTied(const YamlNode& node) {
+  return std::any_of(node.entries.begin(), node.entries.end(),
+                     [](const YamlEntry& entry) { return entry.key == kEqualTo; });
+}
+
+std::optional<std::string> ReadTie(const YamlNode& node, const std::string& path,
+                                   ProblemList& problems) {
+  if (!IsTied(node)) return std::nullopt;
+  MapReader map(node, path, SectionOf("tie"), problems);
+  for (const char* key : {"prior", "min", "max", "mean", "sd", "nuisance"}) {
+    if (!map.Has(key)) continue;
+    map.Problem(key, "has no place beside equal_to: what follows from others is not inferred");
+    map.Ignore({key});
+    return std::nullopt;
+  }
+  auto text = map.Text(kEqualTo);
+  map.Finish();
+  return text;
+}
+
+std::optional<Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
+                                 const std::string& si_unit, ProblemList& problems,
+                                 bool& nuisance) {
+  MapReader map(node, path, SectionOf("parameter"), problems);
   if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
+  nuisance = map.TrueOrFalse("nuisance").value_or(false);
+  return ReadFrom(map, si_unit);
+}
+
+std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
+                                   ProblemList& problems, std::string& si_unit, bool& nuisance) {
+  MapReader map(node, path, SectionOf("parameter"), problems);
+  if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
+  nuisance = map.TrueOrFalse("nuisance").value_or(false);
   si_unit = UnitOfNumbers(map);
   return ReadFrom(map, si_unit);
 }

@@ -22,9 +22,21 @@ std::optional<inference::Prior> ReadPrior(const YamlNode& node, const std::strin
 /// The SI unit that the numbers of a prior carry, or that its `unit` says; "1" where they are plain.
 std::string UnitOfPrior(const YamlNode& node);
 
-/// ReadPrior() for a parameter that no catalogue knows (precomputed runs): its unit is what its
+/// What stands at `equal_to` of a parameter that follows from others. Empty: there is no such key,
+/// or a problem was added.
+std::optional<std::string> ReadTie(const YamlNode& node, const std::string& path,
+                                   ProblemList& problems);
+bool IsTied(const YamlNode& node);
+
+/// ReadPrior() and whether the parameter is a nuisance.
+std::optional<inference::Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
+                                            const std::string& si_unit, ProblemList& problems,
+                                            bool& nuisance);
+
+/// ReadPriorOf() for a parameter that no catalogue knows (precomputed runs): its unit is what its
 /// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).
 std::optional<inference::Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
-                                              ProblemList& problems, std::string& si_unit);
+                                              ProblemList& problems, std::string& si_unit,
+                                              bool& nuisance);
 
 }  // namespace calib::campaign

@@ -92,6 +92,7 @@ export interface Posterior {
   log_evidence: Maybe;
   log_evidence_se: Maybe;
   parameters: Record<string, Parameter>;
+  nuisance_parameters?: Record<string, Parameter>; // inferred, not among the wanted; behind them in correlation and path
   correlation: number[][];
   ess: Maybe;
   posterior_from: string | null;

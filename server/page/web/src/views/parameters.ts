@@ -9,10 +9,10 @@ import { absent, empty, FigureList, keeper, valueOf, warnings, watchAll, type Co
 
 const kMostInCorner = 6;
 
-export function parameterTable(posterior: Posterior): HTMLElement {
-  const rows = Object.entries(posterior.parameters);
-  return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Parameters" }, h("table", {},
-    h("thead", {}, h("tr", {}, ["parameter", "mean", "sd", "variation", "5 %", "median", "95 %", "prior", ""].map((name, i) =>
+export function parameterTable(parameters: Posterior["parameters"], title = "parameter"): HTMLElement {
+  const rows = Object.entries(parameters);
+  return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": title === "parameter" ? "Parameters" : "Nuisance parameters" }, h("table", {},
+    h("thead", {}, h("tr", {}, [title, "mean", "sd", "variation", "5 %", "median", "95 %", "prior", ""].map((name, i) =>
       h("th", { scope: "col", class: i === 0 || i === 8 ? "text" : "" }, name)))),
     h("tbody", {}, rows.map(([name, p]) => {
       const unit = unitForPeople(name, p.unit, Math.abs(p.mean ?? 0));
@@ -65,7 +65,8 @@ export const parametersView: View = (root, context) => {
       posterior.predictive_p === null ? null : [" Data like these or further off under the model: ", value(posterior.predictive_p, chanceText(posterior.predictive_p)), "."]),
       (posterior.noise_scale ?? []).map(({ observables, q05, q50, q95 }) => h("p", {}, `Errors of ${observables.map(nameForPeople).join(", ")} are `,
         value(q50, numberText(q50, 2)), ` times as large as stated (5 to 95 %: ${numberText(q05, 2)} to ${numberText(q95, 2)}).`)),
-      warnings(posterior.warnings), parameterTable(posterior));
+      warnings(posterior.warnings), parameterTable(posterior.parameters),
+      Object.keys(posterior.nuisance_parameters ?? {}).length === 0 ? null : parameterTable(posterior.nuisance_parameters!, "nuisance"));
     const laid: NamedPosterior[] = [{ name: nameIn(lineage, id), posterior }];
     rest.forEach((answer, i) => {
       const other = valueOf<Posterior>(answer);
