@@ -86,6 +86,7 @@ std::pair<double, double> BoundsOf(const std::vector<double>& values) {
 ObservableSummary SummaryOf(const MeasuredObservable& observable) {
   ObservableSummary summary;
   summary.name = observable.name;
+  summary.unit = observable.unit;
   const std::vector<Eigen::Index> rows = RowsRead(observable);
   summary.readings = static_cast<int>(rows.size());
   summary.missing = static_cast<int>(observable.values.size()) - summary.readings;
@@ -105,6 +106,7 @@ ExperimentSummary SummaryOf(const Experiment& experiment) {
   ExperimentSummary summary;
   summary.name = experiment.name;
   summary.control = experiment.control_name;
+  summary.control_unit = experiment.control_unit;
   if (!experiment.path.empty()) {
     summary.from = experiment.path.front().target;
     summary.to = experiment.path.back().target;

@@ -12,6 +12,7 @@ namespace calib::campaign {
 /// SI; NaN where there is none.
 struct ObservableSummary {
   std::string name;
+  std::string unit = "1";  ///< SI
   int readings = 0;
   int missing = 0;  ///< rows without one
   double first = std::numeric_limits<double>::quiet_NaN();
@@ -24,7 +25,8 @@ struct ObservableSummary {
 
 struct ExperimentSummary {
   std::string name;
-  std::string control;  ///< name; empty: readings are merely counted
+  std::string control;             ///< name; empty: readings are merely counted
+  std::string control_unit = "1";  ///< SI
   double from = std::numeric_limits<double>::quiet_NaN();  ///< of the path, SI
   double to = std::numeric_limits<double>::quiet_NaN();
   int turning_points = 0;

@@ -254,6 +254,7 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
       CheckFree(experiment_map, spec.name, control, experiment);
     MeasuredObservable observable{.name = spec.name, .values = {}, .sd = {}};
     const bool given = table && (rules.measured || table->Has(spec.name));
+    if (table) observable.unit = table->UnitOf(spec.name);
     const std::vector<double> raw = given ? table->Raw(spec.name, context) : std::vector<double>();
     if (given) {
       observable.values = table->ToModel(spec.name, raw, context);
@@ -280,6 +281,7 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   }
   if (context.problems().size() > before) return;
   experiment.control_name = control.name;
+  if (!control.name.empty()) experiment.control_unit = table->UnitOf(control.name);
   experiment.control_start = StartOf(control.name, experiment);
   if (test != nullptr && !rules.free_names) {
     CheckRange(*table, *test, control, experiment.control, context);

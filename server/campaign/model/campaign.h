@@ -55,6 +55,7 @@ struct MeasuredObservable {
   /// What sd follows from, and would where nothing is measured yet; empty: the file states no such
   /// law (a column, a covariance, nothing).
   std::optional<NoiseLaw> noise = {};
+  std::string unit = "1";  ///< SI, of the catalogue or of the column
 };
 
 /// Indices of the rows in which it was measured.
@@ -117,6 +118,7 @@ struct Experiment {
   dem::Staging staging;
   /// Observable that drives the loading; empty: readings are merely counted.
   std::string control_name;
+  std::string control_unit = "1";  ///< SI
   /// Where loading starts: 0 for strains, the start pressure for stresses.
   double control_start = 0;
   std::vector<dem::ControlPoint> path;  ///< load_step = index of the reading

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/registry/catalog.h"
 #include "server/campaign/checks/experiment_summary.h"
 #include "server/campaign/checks/warning.h"
 #include "server/campaign/file/parameters/setting_names.h"
@@ -23,18 +22,15 @@ struct ValidateOptions {
   std::string file;
 };
 
-std::string Value(const std::string& name, double value) {
-  const dem::ObservableInfo* info = dem::FindObservable(name);
-  return report::NumberWithUnit(value, name, info != nullptr ? info->unit : "1");
-}
-
 // What was read: the first look at a new file.
 std::string Shown(const campaign::ExperimentSummary& summary) {
   std::string text = absl::StrCat("\n", summary.name);
   if (!summary.control.empty()) {
-    absl::StrAppend(&text, ": ", summary.control, " from ", Value(summary.control, summary.from),
-                    " to ", Value(summary.control, summary.to), ", ", summary.turning_points,
-                    " turning points");
+    absl::StrAppend(&text, ": ", summary.control, " from ",
+                    report::NumberWithUnit(summary.from, summary.control, summary.control_unit),
+                    " to ",
+                    report::NumberWithUnit(summary.to, summary.control, summary.control_unit), ", ",
+                    summary.turning_points, " turning points");
   }
   if (summary.grains > 0) {
     absl::StrAppend(&text, "; ", summary.grains, " grains, d50 ",
@@ -44,8 +40,9 @@ std::string Shown(const campaign::ExperimentSummary& summary) {
   report::TextTable table(
       {"<observable", "readings", "missing", "first", "last", "sd from", "sd to"});
   for (const campaign::ObservableSummary& o : summary.observables) {
-    table.AddRow({o.name, absl::StrCat(o.readings), absl::StrCat(o.missing), Value(o.name, o.first),
-                  Value(o.name, o.last), Value(o.name, o.sd_min), Value(o.name, o.sd_max)});
+    const auto shown = [&o](double value) { return report::NumberWithUnit(value, o.name, o.unit); };
+    table.AddRow({o.name, absl::StrCat(o.readings), absl::StrCat(o.missing), shown(o.first),
+                  shown(o.last), shown(o.sd_min), shown(o.sd_max)});
   }
   return text + "\n" + table.ToString();
 }

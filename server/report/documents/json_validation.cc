@@ -12,14 +12,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-DisplayUnit UnitOfObservable(const std::string& name, double largest) {
-  const dem::ObservableInfo* info = dem::FindObservable(name);
-  return UnitForPeople(name, info != nullptr ? info->unit : "1", largest);
-}
-
 Json ObservableJson(const campaign::ObservableSummary& summary) {
-  const DisplayUnit unit =
-      UnitOfObservable(summary.name, std::fmax(std::abs(summary.min), std::abs(summary.max)));
+  const DisplayUnit unit = UnitForPeople(summary.name, summary.unit,
+                                         std::fmax(std::abs(summary.min), std::abs(summary.max)));
   return {{"name", summary.name},
           {"readings", summary.readings},
           {"missing", summary.missing},
@@ -31,8 +26,8 @@ Json ObservableJson(const campaign::ObservableSummary& summary) {
 }
 
 Json SummaryJson(const campaign::ExperimentSummary& summary) {
-  const DisplayUnit unit =
-      UnitOfObservable(summary.control, std::fmax(std::abs(summary.from), std::abs(summary.to)));
+  const DisplayUnit unit = UnitForPeople(summary.control, summary.control_unit,
+                                         std::fmax(std::abs(summary.from), std::abs(summary.to)));
   const DisplayUnit length = UnitForPeople("d50", "m", summary.d50);
   Json observables = Json::array();
   for (const campaign::ObservableSummary& observable : summary.observables) {

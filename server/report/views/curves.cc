@@ -16,11 +16,6 @@ namespace {
 constexpr std::size_t kBestRuns = 10;
 constexpr std::size_t kOtherRuns = 10;
 
-std::string UnitOf(const std::string& observable) {
-  const dem::ObservableInfo* info = dem::FindObservable(observable);
-  return info != nullptr ? info->unit : "1";
-}
-
 std::map<std::string, ExperimentCurves::Setting> SettingsOf(
     const campaign::Experiment& experiment) {
   std::map<std::string, ExperimentCurves::Setting> settings;
@@ -54,7 +49,7 @@ ObservableCurves CurvesOf(const CampaignView& view, const campaign::Experiment& 
   const campaign::MeasuredObservable& measured = experiment.observables[j];
   const std::vector<double> none(experiment.control.size(), std::nan(""));
   ObservableCurves curves{.name = measured.name,
-                          .unit = UnitOf(measured.name),
+                          .unit = measured.unit,
                           .values = measured.values.empty() ? none : measured.values,
                           .sd = none,
                           .total_sd = none,
@@ -126,7 +121,7 @@ std::vector<ExperimentCurves> Curves(const CampaignView& view,
         .heldout = experiment.role == campaign::Role::kValidate,
         .settings = SettingsOf(experiment),
         .control = experiment.control_name,
-        .control_unit = experiment.control_name.empty() ? "" : UnitOf(experiment.control_name),
+        .control_unit = experiment.control_name.empty() ? "" : experiment.control_unit,
         .control_values = experiment.control,
         .segments = experiment.segment,
         .runs = runs};
