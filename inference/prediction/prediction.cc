@@ -52,16 +52,22 @@ double MeanStretch(const QuantityPrediction& prediction) {
   return std::sqrt(1 + 1 / static_cast<double>(prediction.conditional_mean.rows()));
 }
 
+// Of the law that is stretched about its median, which is known.
+double StretchedQuantile(const QuantityPrediction& prediction, Index t, double p, double middle) {
+  const double stretch =
+      StudentRatio(prediction.freedom, std::min(p, 1 - p)) * MeanStretch(prediction);
+  return middle + stretch * (Quantile(prediction, t, p) - middle);
+}
+
 void SetQuantiles(QuantityPrediction& result) {
   const Index t = result.mean.size();
-  const double stretch = StudentRatio(result.freedom) * MeanStretch(result);
   result.q05.resize(t);
   result.q50.resize(t);
   result.q95.resize(t);
   for (Index k = 0; k < t; ++k) {
     const double middle = result.q50[k] = Quantile(result, k, 0.5);
-    result.q05[k] = middle + stretch * (Quantile(result, k, 0.05) - middle);
-    result.q95[k] = middle + stretch * (Quantile(result, k, 0.95) - middle);
+    result.q05[k] = StretchedQuantile(result, k, 0.05, middle);
+    result.q95[k] = StretchedQuantile(result, k, 0.95, middle);
   }
 }
 
@@ -159,6 +165,31 @@ Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, doub
     probability[k] = StretchedExceeds(prediction, k, level);
   }
   return probability;
+}
+
+Eigen::VectorXd QuantileOf(const QuantityPrediction& prediction, double p) {
+  Eigen::VectorXd quantile(prediction.mean.size());
+  for (Index k = 0; k < quantile.size(); ++k) {
+    quantile[k] =
+        p == 0.5 ? prediction.q50[k] : StretchedQuantile(prediction, k, p, prediction.q50[k]);
+  }
+  return quantile;
+}
+
+ExceedanceParts PartsOfExceedance(const QuantityPrediction& prediction, double level) {
+  const Index t = prediction.mean.size();
+  ExceedanceParts parts{.parameters = Eigen::VectorXd::Constant(t, kNone),
+                        .model = Eigen::VectorXd::Constant(t, kNone)};
+  if (!prediction.separated) return parts;
+  for (Index k = 0; k < t; ++k) {
+    const auto reaches = (prediction.conditional_mean.col(k).array() >= level).count();
+    parts.parameters[k] =
+        static_cast<double>(reaches) / static_cast<double>(prediction.conditional_mean.rows());
+    const double sd = prediction.sd_model[k];
+    parts.model[k] = sd > 0 ? 0.5 * std::erfc((level - prediction.mean[k]) / (sd * std::sqrt(2.0)))
+                            : (prediction.mean[k] >= level ? 1.0 : 0.0);
+  }
+  return parts;
 }
 
 double ExceedanceAnywhere(const QuantityPrediction& prediction, const Eigen::MatrixXd& runs,

@@ -50,6 +50,18 @@ QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::Ve
 ///                                                                  [Hadjidoukas 2014, Eqs. 11, 12]
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);
 
+/// Quantile of probability p, in (0, 1), of each of the T quantities by that same law: at 0.05, 0.5
+/// and 0.95 the prediction's own.
+Eigen::VectorXd QuantileOf(const QuantityPrediction& prediction, double p);
+
+/// What Pr(Q_t >= level) would be by one part of what is uncertain alone.
+struct ExceedanceParts {
+  Eigen::VectorXd parameters;  ///< T, share of the posterior draws whose mu reaches the level
+  Eigen::VectorXd model;  ///< T, normal tail of the model's error about the posterior mean of mu
+};
+/// NaN where the two parts are not separated.                                [Hadjidoukas 2014, Eq. 15]
+ExceedanceParts PartsOfExceedance(const QuantityPrediction& prediction, double level);
+
 /// Pr(Q_t >= level for some t) of T quantities along a history: a run's, its departure from the
 /// mean stretched as the quantiles are, plus an error of the model that is off to one side all
 /// along and errors of readings that know nothing of each other. Never less than the largest

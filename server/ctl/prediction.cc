@@ -206,6 +206,7 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
       out.exceedance.push_back(
           {.level = level.value,
            .probability = inference::ExceedanceProbability(out.quantity, level.value),
+           .parts = inference::PartsOfExceedance(out.quantity, level.value),
            .anywhere = inference::ExceedanceAnywhere(out.quantity, runs.values, missed, error,
                                                      level.value)});
     }

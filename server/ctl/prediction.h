@@ -32,7 +32,8 @@ struct PredictedObservable {
   struct Exceedance {
     double level = 0;             ///< SI
     Eigen::VectorXd probability;  ///< at each reading
-    double anywhere = 0;          ///< that it is reached somewhere, errors included
+    inference::ExceedanceParts parts;
+    double anywhere = 0;  ///< that it is reached somewhere, errors included
   };
   std::vector<Exceedance> exceedance;
 };

@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "dem/registry/catalog.h"
 #include "server/ctl/prediction.h"
@@ -25,6 +28,45 @@ Json At(const Eigen::VectorXd& values, Index k) {
   return k < values.size() ? Json(values[k]) : Json(nullptr);
 }
 
+// Probabilities at which the distribution of a quantity is told.
+constexpr std::array kQuantiles = {0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99};
+constexpr int kStepsOfCdf = 20;  // from 0.025 to 0.975
+
+struct Distribution {
+  std::vector<Eigen::VectorXd> quantiles;               // by kQuantiles, at each reading
+  std::vector<std::pair<double, Eigen::VectorXd>> cdf;  // probability, values at each reading
+};
+
+Distribution DistributionOf(const inference::QuantityPrediction& quantity) {
+  Distribution distribution;
+  for (const double p : kQuantiles)
+    distribution.quantiles.push_back(inference::QuantileOf(quantity, p));
+  for (int i = 0; i < kStepsOfCdf; ++i) {
+    const double p = (i + 0.5) / kStepsOfCdf;
+    distribution.cdf.emplace_back(p, inference::QuantileOf(quantity, p));
+  }
+  return distribution;
+}
+
+Json QuantilesAt(const Distribution& distribution, Index k) {
+  Json quantiles = Json::object();
+  for (std::size_t i = 0; i < kQuantiles.size(); ++i)
+    quantiles[fmt::format("{}", kQuantiles[i])] = distribution.quantiles[i][k];
+  return quantiles;
+}
+
+Json CdfAt(const Distribution& distribution, Index k) {
+  Json cdf = Json::array();
+  for (const auto& [p, values] : distribution.cdf) cdf.push_back({values[k], p});
+  return cdf;
+}
+
+Json Numbers(const Eigen::VectorXd& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(std::isfinite(value) ? Json(value) : nullptr);
+  return list;
+}
+
 Json OrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 }  // namespace
@@ -32,6 +74,7 @@ Json OrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 std::string PredictionJson(const Prediction& prediction) {
   Json observables = Json::array();
   for (const PredictedObservable& o : prediction.observables) {
+    const Distribution distribution = DistributionOf(o.quantity);
     Json points = Json::array();
     for (std::size_t i = 0; i < o.control.size(); ++i) {
       const auto k = static_cast<Index>(i);
@@ -42,6 +85,8 @@ std::string PredictionJson(const Prediction& prediction) {
                         {"q05", o.quantity.q05[k]},
                         {"q50", o.quantity.q50[k]},
                         {"q95", o.quantity.q95[k]},
+                        {"quantiles", QuantilesAt(distribution, k)},
+                        {"cdf", CdfAt(distribution, k)},
                         {"sd_parameters", OrNull(o.quantity.sd_parameters[k])},
                         {"sd_model_error", OrNull(o.quantity.sd_model[k])},
                         {"sd_noise", At(o.sd_noise, k)},
@@ -54,6 +99,8 @@ std::string PredictionJson(const Prediction& prediction) {
       exceedance.push_back(
           {{"level", e.level},
            {"probability", std::vector<double>(e.probability.begin(), e.probability.end())},
+           {"parameter_part", Numbers(e.parts.parameters)},
+           {"model_part", Numbers(e.parts.model)},
            {"anywhere", e.anywhere}});
     }
     observables.push_back({{"experiment", o.experiment},

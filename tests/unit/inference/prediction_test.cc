@@ -46,6 +46,10 @@ TEST(Prediction, TellsParametersFromScatterFromTheErrorOfAReading) {
   EXPECT_NEAR(p->q95[0], 5 + 1.645 * sd, 0.06 * sd);
   EXPECT_NEAR(ExceedanceProbability(*p, 5 + sd)[0], 0.1587, 0.015);
   EXPECT_NEAR(ExceedanceProbability(*p, 5 + 100 * sd)[0], 0, 1e-12);
+  // At a level of 7: 1 - Phi(2 / sqrt(5)) by the parameters, 1 - Phi(2 / 1.5) by scatter.
+  const ExceedanceParts parts = PartsOfExceedance(*p, 7);
+  EXPECT_NEAR(parts.parameters[0], 0.1855, 0.025);
+  EXPECT_NEAR(parts.model[0], 0.0912, 0.015);
 }
 
 TEST(Prediction, TwentyRunsAreUnbiased) {
@@ -120,6 +124,11 @@ TEST(Prediction, ProbabilitiesAreThoseOfTheBand) {
       EXPECT_NEAR(ExceedanceProbability(*p, p->q05[0])[0], 0.95, 1e-6) << n << " runs";
       EXPECT_NEAR(ExceedanceProbability(*p, p->q50[0])[0], 0.5, 1e-6) << n << " runs";
       EXPECT_NEAR(ExceedanceProbability(*p, p->q95[0])[0], 0.05, 1e-6) << n << " runs";
+      for (const double probability : {0.01, 0.2, 0.5, 0.9, 0.99}) {
+        const double level = QuantileOf(*p, probability)[0];
+        EXPECT_NEAR(ExceedanceProbability(*p, level)[0], 1 - probability, 1e-6) << n << " runs";
+      }
+      EXPECT_EQ(QuantileOf(*p, 0.05)[0], p->q05[0]);
     }
   }
 }
