@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -37,8 +38,10 @@ absl::Status ProblemIn(const std::string& path, int line, const std::string& tex
 }
 
 // control: {column, to, readings} as a table of its own.
-absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
-                             std::map<std::string, std::string>& files) {
+// Of a program's test that has no name here (parent: whose program; else nullptr) what drives it
+// may be any column, in the unit that its end is written in.
+absl::Status SpellOutControl(const std::string& path, const campaign::Campaign* parent,
+                             YamlNode& experiment, std::map<std::string, std::string>& files) {
   const YamlNode* control = campaign::YamlFind(experiment, "control");
   const YamlNode* to = control != nullptr ? campaign::YamlFind(*control, "to") : nullptr;
   if (to == nullptr) return absl::OkStatus();
@@ -50,11 +53,16 @@ absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
   }
   const std::string name = column != nullptr ? column->scalar : "";
   const dem::ObservableInfo* info = dem::FindObservable(name);
-  if (info == nullptr) {
+  if (name.empty() || (info == nullptr && parent == nullptr)) {
     return ProblemIn(path, control->line,
                      "control.column names what drives the test, e.g. axial_strain");
   }
-  const auto end = campaign::ParseQuantity(to->scalar, info->unit);
+  const auto written = campaign::SplitQuantity(to->scalar);
+  const auto own_unit = campaign::ParseUnit(written.ok() ? written->unit : "");
+  const std::string unit = info != nullptr ? info->unit
+                           : own_unit.ok() ? campaign::SiName(own_unit->dimension)
+                                           : "1";
+  const auto end = campaign::ParseQuantity(to->scalar, unit);
   if (!end.ok()) {
     return ProblemIn(path, to->line,
                      absl::StrCat("control.to: ", std::string(end.status().message())));
@@ -78,9 +86,28 @@ absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
       absl::StrCat("control-", campaign::Sha256Hex(table).substr(0, 16), ".csv");
   campaign::YamlAt(experiment, "data") = campaign::YamlMap(
       {{"file", campaign::YamlScalar(file)}, {"strain", campaign::YamlScalar("logarithmic")}});
+  if (parent != nullptr) {
+    YamlNode& units = campaign::YamlAt(campaign::YamlAt(experiment, "data"), "units");
+    units = campaign::YamlMap({});
+    if (info == nullptr) campaign::YamlAt(units, name) = campaign::YamlScalar(unit);
+    for (const campaign::Experiment& known : parent->experiments) {
+      for (const campaign::MeasuredObservable& observable : known.observables)
+        campaign::YamlAt(units, observable.name) = campaign::YamlScalar(observable.unit);
+    }
+  }
   campaign::YamlAt(experiment, "control") = campaign::YamlScalar(name);
   files[file] = table;
   return absl::OkStatus();
+}
+
+// Whether a campaign's program is made of this file, or of what a listing of it names.
+bool IsOfProgram(const campaign::Campaign& campaign, const std::string& name) {
+  if (!campaign.program) return false;
+  const std::string plain = name.ends_with('/') ? name.substr(0, name.size() - 1) : name;
+  const auto& files = campaign.program->files;
+  return std::any_of(files.begin(), files.end(), [&plain](const campaign::ProgramFile& file) {
+    return file.path == plain || file.path.starts_with(plain + "/");
+  });
 }
 
 // What stands in a test to be predicted is meant, whatever the campaign has found of its own tests.
@@ -128,11 +155,13 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
       return ProblemIn(path, given->line, "experiments is no list with at least one experiment");
     }
     list = *given;
-  } else if (campaign::YamlFind(*parse.root, "test") != nullptr) {
+  } else if (campaign::YamlFind(*parse.root, "test") != nullptr ||
+             campaign::YamlFind(*parse.root, "observables") != nullptr) {
     list = campaign::YamlList({*parse.root});
   } else {
-    return ProblemIn(
-        path, 1, "has neither the key test (of one experiment) nor experiments (a list of them)");
+    return ProblemIn(path, 1,
+                     "has neither the keys of one experiment (test, observables) nor experiments "
+                     "(a list of them)");
   }
   campaign::YamlParse own = campaign::ParseYaml(parent.source.campaign_file());
   if (own.root) campaign::StateNominalValues(*own.root, parent.campaign);
@@ -149,7 +178,10 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
           list.items.size() == 1 ? "predicted" : absl::StrCat("predicted_", number));
     }
     campaign::YamlErase(experiment, "role");
-    RETURN_IF_ERROR(SpellOutControl(path, experiment, tests.files));
+    const bool free_names =
+        parent.campaign.program && campaign::YamlFind(experiment, "test") == nullptr;
+    RETURN_IF_ERROR(
+        SpellOutControl(path, free_names ? &parent.campaign : nullptr, experiment, tests.files));
     KeepAsStated(parent.campaign, experiment);
     if (first != nullptr && !first->items.empty()) TakeSpecimen(first->items.front(), experiment);
   }
@@ -173,6 +205,10 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
   std::map<std::string, std::string>& files = tests.files;
   const campaign::FileReader reader = [&](const std::string& name) -> absl::StatusOr<std::string> {
     if (const auto known = files.find(name); known != files.end()) return known->second;
+    if (IsOfProgram(parent.campaign, name)) {  // as it was calibrated, whatever lies here now
+      const auto kept = parent.source.files().find(name);
+      if (kept != parent.source.files().end()) return client.GetBlob(kept->second);
+    }
     auto content = disk(name);
     if (content.ok()) files[name] = *content;
     const auto inherited = parent.source.files().find(name);
@@ -189,7 +225,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
   }
   if (!lines.empty()) return absl::InvalidArgumentError(absl::StrJoin(lines, "\n"));
   for (const campaign::Experiment& e : outcome.campaign.experiments) {
-    for (const campaign::MeasuredObservable& o : e.observables) tests.observables.insert(o.name);
+    for (const campaign::MeasuredObservable& o : e.observables) tests.observables[o.name] = o.unit;
   }
   return tests;
 }

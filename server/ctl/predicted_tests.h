@@ -3,7 +3,6 @@
 // path.
 
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -17,8 +16,8 @@ namespace calib::ctl {
 /// The tests to predict as a list of experiments, with the files they name.
 struct PredictedTests {
   std::vector<campaign::YamlNode> experiments;
-  std::map<std::string, std::string> files;  ///< path as written -> content
-  std::set<std::string> observables;         ///< that any of the tests has
+  std::map<std::string, std::string> files;        ///< path as written -> content
+  std::map<std::string, std::string> observables;  ///< that any of the tests has, and SI units
 };
 
 /// Gives an experiment without `packing` that of another one, with its `realizations` and, where it

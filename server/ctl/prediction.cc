@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -71,9 +71,10 @@ struct Level {
   double value = 0;
 };
 
-absl::StatusOr<std::vector<Level>> ReadLevels(const std::vector<std::string>& texts,
-                                              const std::set<std::string>& observables) {
-  const std::vector<std::string> known(observables.begin(), observables.end());
+absl::StatusOr<std::vector<Level>> ReadLevels(
+    const std::vector<std::string>& texts, const std::map<std::string, std::string>& observables) {
+  std::vector<std::string> known;
+  for (const auto& [name, unit] : observables) known.push_back(name);
   std::vector<Level> levels;
   for (const std::string& text : texts) {
     const std::size_t equals = text.find('=');
@@ -89,9 +90,13 @@ absl::StatusOr<std::vector<Level>> ReadLevels(const std::vector<std::string>& te
           absl::StrCat("--exceed ", campaign::Quoted(text),
                        " names no observable of the test: ", campaign::Suggestion(name, known)));
     }
-    const dem::ObservableInfo* info = dem::FindObservable(name);
-    const auto value =
-        campaign::ParseQuantity(text.substr(equals + 1), info != nullptr ? info->unit : "1");
+    // A program's observable that is only predicted has no unit here: what stands there is one.
+    const std::string& unit = observables.at(name);
+    const auto written = campaign::SplitQuantity(text.substr(equals + 1));
+    const auto own = campaign::ParseUnit(written.ok() ? written->unit : "");
+    const bool free = unit == "1" && dem::FindObservable(name) == nullptr && own.ok();
+    const auto value = campaign::ParseQuantity(text.substr(equals + 1),
+                                               free ? campaign::SiName(own->dimension) : unit);
     if (!value.ok()) {
       return absl::InvalidArgumentError(
           absl::StrCat("--exceed ", name, ": ", std::string(value.status().message())));
@@ -195,6 +200,8 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     PredictedObservable out{.experiment = experiment.name,
                             .observable = observable.name,
                             .control_name = experiment.control_name,
+                            .unit = observable.unit,
+                            .control_unit = experiment.control_unit,
                             .control = experiment.control,
                             .quantity = std::move(quantity),
                             .sd_noise = stated,

@@ -20,8 +20,9 @@ struct PredictionOptions {
 
 struct PredictedObservable {
   std::string experiment, observable, control_name;
-  std::vector<double> control;             ///< at each reading, SI
-  inference::QuantityPrediction quantity;  ///< at each reading, SI
+  std::string unit = "1", control_unit = "1";  ///< SI
+  std::vector<double> control;                 ///< at each reading, SI
+  inference::QuantityPrediction quantity;      ///< at each reading, SI
   /// Standard deviation of the error of the measurement that is predicted, at each reading; part of
   /// quantity.sd, of its quantiles and of the exceedance. Empty: the test states none.
   Eigen::VectorXd sd_noise{};

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "dem/registry/catalog.h"
 #include "server/ctl/prediction.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
@@ -18,11 +17,6 @@ namespace {
 
 using Eigen::Index;
 using Json = nlohmann::json;
-
-std::string UnitOf(const std::string& observable) {
-  const dem::ObservableInfo* info = dem::FindObservable(observable);
-  return info != nullptr ? info->unit : "1";
-}
 
 Json At(const Eigen::VectorXd& values, Index k) {
   return k < values.size() ? Json(values[k]) : Json(nullptr);
@@ -105,7 +99,7 @@ std::string PredictionJson(const Prediction& prediction) {
     }
     observables.push_back({{"experiment", o.experiment},
                            {"observable", o.observable},
-                           {"unit", UnitOf(o.observable)},
+                           {"unit", o.unit},
                            {"control", o.control_name},
                            {"points", points},
                            {"exceedance", exceedance}});
@@ -125,13 +119,13 @@ std::string PredictionText(const Prediction& prediction) {
   for (const PredictedObservable& o : prediction.observables) {
     report::TextTable table(
         {o.control_name, "mean", "5 %", "95 %", "± parameters", "± model", "± noise", "measured"});
-    const std::string unit = UnitOf(o.observable);
+    const std::string& unit = o.unit;
     const auto shown = [&](double value) {
       return std::isfinite(value) ? report::NumberWithUnit(value, o.observable, unit, 4) : "–";
     };
     for (std::size_t i = 0; i < o.control.size(); ++i) {
       const auto k = static_cast<Index>(i);
-      table.AddRow({report::NumberWithUnit(o.control[i], o.control_name, UnitOf(o.control_name), 4),
+      table.AddRow({report::NumberWithUnit(o.control[i], o.control_name, o.control_unit, 4),
                     shown(o.quantity.mean[k]), shown(o.quantity.q05[k]), shown(o.quantity.q95[k]),
                     shown(o.quantity.sd_parameters[k]), shown(o.quantity.sd_model[k]),
                     i < static_cast<std::size_t>(o.sd_noise.size()) ? shown(o.sd_noise[k]) : "–",
