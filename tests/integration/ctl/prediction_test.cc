@@ -127,7 +127,7 @@ TEST_F(Predicting, RefusesInASentence) {
   Write("nothing.yaml", "name: nothing\n");
   const Answer nothing = Call("predict c1 --test nothing.yaml --state s");
   EXPECT_EQ(nothing.code, 2);
-  EXPECT_NE(nothing.err.find("neither the key test"), std::string::npos) << nothing.err;
+  EXPECT_NE(nothing.err.find("neither the keys of one experiment"), std::string::npos) << nothing.err;
   Write("wrong.yaml",
         "name: a\ntest: triaxial_drained\ncontrol: {column: axial_strain, to: 1 percent}\n"
         "observables: [q_over_q]\n");

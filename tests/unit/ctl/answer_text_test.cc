@@ -84,6 +84,8 @@ TEST(PredictionText, NamesTheNoiseThatIsInTheBand) {
                              &o.quantity.q95, &o.quantity.sd_parameters, &o.quantity.sd_model}) {
     *v = Eigen::VectorXd::Constant(1, 2);
   }
+  o.quantity.conditional_mean = Eigen::MatrixXd::Constant(3, 1, 2);
+  o.quantity.conditional_sd = Eigen::VectorXd::Constant(1, 0.5);
   Prediction prediction;
   prediction.observables.push_back(o);
   EXPECT_THAT(PredictionText(prediction), Not(HasSubstr("measurement with its noise")));

@@ -107,6 +107,7 @@ TEST(Json, ValidationSaysWhatWasReadOfEachExperiment) {
                                       .d50 = 2e-3,
                                       .porosity = 0.4};
   summary.observables.push_back({.name = "axial_stress",
+                                 .unit = "Pa",
                                  .readings = 24,
                                  .missing = 1,
                                  .first = 200e3,
