@@ -221,32 +221,27 @@ struct OtherSources {
   bool derived = false;  // from a campaign whose experiments may be no more
 };
 
-// The prior of a setting, or what it is tied to; of one that a derived campaign has no more, what
-// its numbers say.
+// The prior of a setting, or what it is tied to.
 void ReadSetting(MapReader& parameters, const SettingNamed& named, CalibratedParameter parameter,
                  Campaign& campaign, std::vector<TieAsWritten>& ties) {
   const std::string& name = parameter.name;
   const YamlNode& node = *parameters.Find(name);
   const std::string path = parameters.PathOf(name);
-  parameter.setting = named.setting.value_or(SettingOf{});
+  parameter.setting = named.setting;
   parameter.unit = named.unit;
+  const Range& range = named.setting->range;
   if (IsTied(node)) {
     ties.push_back({.name = name,
                     .unit = parameter.unit,
-                    .range = parameter.setting->range,
+                    .range = range,
                     .text = ReadTie(node, path, parameters.problems()).value_or(""),
                     .setting = parameter.setting});
     return;
   }
-  const auto prior =
-      named.setting
-          ? ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)
-          : ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance);
-  if (prior) {
+  if (const auto prior =
+          ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)) {
     parameter.prior = *prior;
-    if (named.setting) {
-      HoldToAdmissible(named.setting->range, parameter.unit, name, parameters, parameter.prior);
-    }
+    HoldToAdmissible(range, parameter.unit, name, parameters, parameter.prior);
   }
   campaign.parameters.push_back(std::move(parameter));
 }
@@ -302,7 +297,7 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
   const bool is_design = campaign.method == Method::kDesign;
   const dem::ParameterInfo* info = is_design ? FindNumerics(name) : nullptr;
   if (info == nullptr) info = dem::FindParameter(model, name);
-  SettingNamed named = FindSetting(name, others.experiments);
+  SettingNamed named = FindSetting(name, others.experiments, info == nullptr && others.derived);
   if (info != nullptr && named.setting) {
     named.problem = absl::StrCat("has two meanings, the parameter of the model and ", named.meaning,
                                  "; the setting of one is called EXPERIMENT.", name);
@@ -311,7 +306,7 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
     parameters.Problem(name, named.problem);
     return;
   }
-  if (named.setting || (info == nullptr && others.derived)) {
+  if (named.setting) {
     ReadSetting(parameters, named, std::move(parameter), campaign, ties);
     return;
   }

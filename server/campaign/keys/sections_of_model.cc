@@ -126,9 +126,8 @@ Section Parameters() {
   return {"parameters",
           "parameters",
           {{"NAME", AnyOf({OneWord({"default"}), MapOf("parameter"), MapOf("tie")}), "",
-            "prior of a parameter of the model or of a setting, or what it follows from; default: "
-            "the catalogue's",
-            "`NAME` of the model, `[EXPERIMENT.]SETTING`, `[EXPERIMENT.]GROUP.KEY`"}},
+            "prior of a parameter: NAME of the model, [EXPERIMENT.]SETTING or "
+            "[EXPERIMENT.]GROUP.KEY; or what it follows from; default: the catalogue's"}},
           ParametersOffered()};
 }
 
@@ -146,7 +145,9 @@ std::vector<Key> KeysOfPrior() {
   };
 }
 
-Section PriorKeys() { return {"prior", "user_effects[].parameters.NAME.prior", KeysOfPrior()}; }
+Section PriorKeys() {
+  return {"prior", "model.user_effects.NAME.parameters.NAME.prior", KeysOfPrior()};
+}
 
 Section ParameterKeys() {
   std::vector<Key> keys = KeysOfPrior();

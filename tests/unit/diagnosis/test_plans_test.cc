@@ -95,6 +95,28 @@ TEST(TestPlans, ARateIsVariedAndKeptByTheOthers) {
             "2 1/s");
 }
 
+TEST(TestPlans, WhatIsPlannedStaysWhereAParameterSetsItInAllTests) {
+  campaign::Campaign campaign = Measured();
+  campaign.parameters = {
+      {.name = "confining_pressure",
+       .unit = "Pa",
+       .prior = {.min = 9e4, .max = 1.1e5},
+       .setting = campaign::SettingOf{.number = "confining_pressure", .experiments = {"dense"}}}};
+  const std::vector<TestPlan> plans = Named(PlansFor(campaign), 1);
+  const auto named = EntryNamed("experiments: [{name: dense}]\n", campaign, "dense");
+  ASSERT_TRUE(named.has_value());
+  EXPECT_DOUBLE_EQ(std::stod(campaign::YamlFind(*named, "confining_pressure")->scalar), 1e5);
+  const auto kept = [&](double pressure) {
+    const auto plan = std::find_if(plans.begin(), plans.end(), [pressure](const TestPlan& one) {
+      return std::abs(one.experiment.settings.at("confining_pressure") / pressure - 1) < 1e-9;
+    });
+    const auto entry = EntryFor(*plan, campaign.experiments.front(), *named, campaign);
+    const auto* names = campaign::YamlFind(entry, "as_stated");
+    return names == nullptr ? std::string() : names->items.front().scalar;
+  };
+  EXPECT_EQ(kept(4 * 4e5), "confining_pressure");
+}
+
 TEST(TestPlans, AnInitialStressGrowsWithThePressure) {
   campaign::Campaign campaign = Measured();
   for (auto& experiment : campaign.experiments) {

@@ -60,8 +60,6 @@ const std::vector<KeyedNumber>& KeysOfSizes() {
   return *keys;
 }
 
-constexpr const char* kShareOfGrains = "materials.grains.";
-
 const YamlNode* At(const YamlNode& root, const std::vector<std::string>& path) {
   const YamlNode* node = &root;
   for (const std::string& key : path) {
@@ -156,17 +154,20 @@ void AddRecipe(const ExperimentOutline& outline, bool in_cell,
   }
 }
 
+void AddOnce(ExperimentNumber number, std::vector<ExperimentNumber>& all) {
+  const auto same = [&number](const ExperimentNumber& other) {
+    return other.name == number.name && other.unit == number.unit;
+  };
+  if (std::none_of(all.begin(), all.end(), same)) all.push_back(std::move(number));
+}
+
+// Of an experiment whose test nobody knows.
 std::vector<ExperimentNumber> NumbersOfAnyTest(const ExperimentOutline& outline) {
   std::vector<ExperimentNumber> all;
   for (const dem::TestInfo& test : dem::Tests()) {
     ExperimentOutline one = outline;
     one.test = &test;
-    for (ExperimentNumber& number : NumbersOf(one)) {
-      const auto same = [&number](const ExperimentNumber& other) {
-        return other.name == number.name;
-      };
-      if (std::none_of(all.begin(), all.end(), same)) all.push_back(std::move(number));
-    }
+    for (ExperimentNumber& number : NumbersOf(one)) AddOnce(std::move(number), all);
   }
   return all;
 }
@@ -267,6 +268,21 @@ std::vector<ExperimentNumber> NumbersOf(const ExperimentOutline& outline) {
     return outline.as_stated.contains(number.name);
   });
   return numbers;
+}
+
+std::vector<ExperimentNumber> NumbersOfAllTests() {
+  std::vector<ExperimentNumber> all;
+  for (const dem::TestInfo& test : dem::Tests()) {
+    for (const SizesBy sizes : {SizesBy::kMean, SizesBy::kLogNormal}) {
+      for (const std::string& control : {std::string(), test.control}) {
+        ExperimentOutline one{.test = &test};
+        one.sizes = sizes;
+        one.control = control;
+        for (ExperimentNumber& number : NumbersOf(one)) AddOnce(std::move(number), all);
+      }
+    }
+  }
+  return all;
 }
 
 const std::vector<std::string>& GroupsOfNumbers() {

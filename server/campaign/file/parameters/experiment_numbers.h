@@ -43,6 +43,11 @@ struct ExperimentNumber {
 };
 
 std::vector<ExperimentNumber> NumbersOf(const ExperimentOutline& outline);
+/// Those that an experiment of any test can have, but for shares of materials; by name and unit
+/// once.
+std::vector<ExperimentNumber> NumbersOfAllTests();
+/// Before the name of a material whose share of the grains is a number.
+inline constexpr const char* kShareOfGrains = "materials.grains.";
 
 /// Names of the groups that numbers are dotted with: packing, staging, ...; no experiment may have
 /// one.

@@ -84,6 +84,20 @@ std::vector<Meant> MeaningsOf(const std::string& name,
   return meanings;
 }
 
+// Unit of the number of any test by which a name ends; empty: there is none.
+std::optional<std::string> UnitOfSome(const std::string& name) {
+  const ExperimentNumber* longest = nullptr;
+  static const std::vector<ExperimentNumber> all = NumbersOfAllTests();
+  for (const ExperimentNumber& number : all) {
+    const bool ends = name == number.name || absl::EndsWith(name, "." + number.name);
+    if (ends && (longest == nullptr || number.name.size() > longest->name.size())) {
+      longest = &number;
+    }
+  }
+  if (longest != nullptr) return longest->unit;
+  return absl::StrContains(name, kShareOfGrains) ? std::optional<std::string>("1") : std::nullopt;
+}
+
 const YamlNode* ExperimentsOf(const YamlNode& file) { return YamlFind(file, "experiments"); }
 
 int LineOfParameter(const YamlNode& file, const std::string& name) {
@@ -161,10 +175,18 @@ void AddModelParameters(const Campaign& campaign, std::vector<Calibratable>& all
 
 }  // namespace
 
-SettingNamed FindSetting(const std::string& name, const std::vector<ExperimentOutline>& outlines) {
+SettingNamed FindSetting(const std::string& name, const std::vector<ExperimentOutline>& outlines,
+                         bool derived) {
   SettingNamed named;
   const std::vector<Meant> meanings = MeaningsOf(name, outlines);
-  if (meanings.empty()) return named;
+  if (meanings.empty()) {
+    const auto unit = derived ? UnitOfSome(name) : std::nullopt;
+    if (unit) {
+      named.setting = SettingOf{};
+      named.unit = *unit;
+    }
+    return named;
+  }
   const Meant& meant = meanings.front();
   if (meanings.size() > 1) {
     named.problem = absl::StrCat("has two meanings, ", InWords(meant), " and ",

@@ -19,7 +19,10 @@ struct SettingNamed {
   std::string problem{};  ///< a sentence, where it has two meanings
 };
 
-SettingNamed FindSetting(const std::string& name, const std::vector<ExperimentOutline>& outlines);
+/// `derived`: from a campaign whose experiments may be no more, so that a number of none of these
+/// has a meaning all the same: it changes nothing.
+SettingNamed FindSetting(const std::string& name, const std::vector<ExperimentOutline>& outlines,
+                         bool derived = false);
 
 /// Every name that FindSetting() knows; those without an experiment first.
 std::vector<std::string> SettingNames(const std::vector<ExperimentOutline>& outlines);
