@@ -564,7 +564,7 @@ TEST(PouredShapes, ASiloOfElongatedGrainsRunsEmpty) {
   EXPECT_NEAR(rate[1] / rate[0], 1, 0.25);
 }
 
-TEST(PouredShapes, ArchesOfElongatedGrainsAreBroken) {
+TEST(PouredShapesSlow, ArchesOfElongatedGrainsAreBroken) {
   Scenario silo = Elongated(Pour("silo_discharge", 120, {2.6 * kDiameter}), 1.6);
   silo.settings = {{"silo_width", 9 * kDiameter}, {"avalanches", 3}, {"duration", 3}};
   const test::Run one = test::RunAll(silo);

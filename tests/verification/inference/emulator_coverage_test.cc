@@ -94,7 +94,7 @@ TEST(EmulatorCoverage, NinetyPercentIntervalsHoldTheTruthNineTimesInTen) {
 // Triaxial curves in closed form, campaigns of 100 runs, 1 % noise; CALIB_COVERAGE sets the number
 // of campaigns. Intervals of one campaign are related, so that the standard error of the share is
 // taken from the campaigns' own shares.
-TEST(EmulatorCoverage, HundredRunsOfATriaxialTestWithOnePercentNoise) {
+TEST(EmulatorCoverageSlow, HundredRunsOfATriaxialTestWithOnePercentNoise) {
   const char* text = std::getenv("CALIB_COVERAGE");
   const int campaigns = text != nullptr ? std::max(2, std::atoi(text)) : 40;
   Coverage all;

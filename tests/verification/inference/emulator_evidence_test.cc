@@ -58,7 +58,7 @@ double ExactLogEvidence(const ToyCurve& toy, const DataSet& data, std::uint64_t 
   return state.ok() ? state->log_evidence : 0;
 }
 
-TEST(EmulatorEvidence, IsOffByAboutAsMuchAsItSays) {
+TEST(EmulatorEvidenceSlow, IsOffByAboutAsMuchAsItSays) {
   for (const double scatter : {0.0, 0.005}) {
     const ToyCurve toy{.d = 3, .scatter = scatter};
     constexpr int kCampaigns = 8;
