@@ -1,12 +1,10 @@
 #include "worker/once.h"
 
 #include <fmt/format.h>
-#include <google/protobuf/util/json_util.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <optional>
 #include <ostream>
 #include <stop_token>
@@ -20,37 +18,11 @@
 #include "dem/simulate/whole_file.h"
 #include "proto/rpc/digest.h"
 #include "worker/evaluate.h"
+#include "worker/message_file.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {
-
-std::optional<std::string> ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    return std::nullopt;
-  }
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-absl::StatusOr<v1::AttemptSpec> ReadSpec(const std::string& path) {
-  const auto content = ReadFile(path);
-  if (!content.has_value()) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
-  }
-  v1::AttemptSpec spec;
-  const std::size_t first = content->find_first_not_of(" \t\r\n");
-  const bool json = first != std::string::npos && (*content)[first] == '{';
-  if (json) {
-    if (const auto status = google::protobuf::util::JsonStringToMessage(*content, &spec);
-        !status.ok()) {
-      return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::string(status.message())));
-    }
-  } else if (!spec.ParseFromString(*content)) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": not an AttemptSpec"));
-  }
-  return spec;
-}
 
 /// The packing file and the meshes that a single evaluation needs, told apart by their digests.
 Fetch FromFiles(const v1::AttemptSpec& spec, const OnceOptions& options) {
@@ -66,7 +38,7 @@ Fetch FromFiles(const v1::AttemptSpec& spec, const OnceOptions& options) {
     std::string found = mesh ? "the spec names a mesh: give its file with --mesh"
                              : "the spec names a packing file: give it with --packing";
     for (const std::string& path : paths) {
-      auto content = ReadFile(path);
+      auto content = ContentOf(path);
       if (!content.has_value()) {
         return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
       }
@@ -97,11 +69,12 @@ std::string ProblemWith(const std::string& checkpoint, const v1::AttemptSpec& sp
 }  // namespace
 
 int RunOnce(const OnceOptions& options, std::ostream& errors) {
-  const auto spec = ReadSpec(options.spec);
-  if (!spec.ok()) {
-    errors << spec.status().message() << '\n';
+  v1::AttemptSpec read;
+  if (const absl::Status status = ReadMessageFile(options.spec, read); !status.ok()) {
+    errors << status.message() << '\n';
     return kBadSpec;
   }
+  const v1::AttemptSpec* const spec = &read;
   const dem::TestInfo* test = dem::FindTest(spec->test());
   if (test == nullptr) {
     errors << options.spec << ": there is no test \"" << spec->test() << "\"\n";
@@ -110,7 +83,7 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
   Specimens specimens(FromFiles(*spec, options));
   dem::Recording recording{.vtk_directory = options.vtk, .vtk_load_step = options.load_step};
   if (!options.checkpoint.empty()) {
-    recording.resume_from = ReadFile(options.checkpoint).value_or("");
+    recording.resume_from = ContentOf(options.checkpoint).value_or("");
     recording.checkpoint = [&](const std::string& checkpoint) {
       return dem::WriteWholeFile(options.checkpoint, checkpoint);
     };

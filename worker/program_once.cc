@@ -1,43 +1,20 @@
 #include "worker/program_once.h"
 
 #include <fmt/format.h>
-#include <google/protobuf/util/json_util.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <stop_token>
 
 #include "absl/strings/str_cat.h"
+#include "worker/message_file.h"
 #include "worker/once.h"
 #include "worker/program/programs.h"
 
 namespace calib::worker {
 namespace {
-
-std::optional<std::string> ContentOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::nullopt;
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-absl::StatusOr<v1::ProgramRun> ReadProgramRun(const std::string& path) {
-  const auto content = ContentOf(path);
-  if (!content) return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
-  v1::ProgramRun run;
-  if (content->starts_with('{')) {
-    const auto status = google::protobuf::util::JsonStringToMessage(*content, &run);
-    if (!status.ok()) {
-      return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::string(status.message())));
-    }
-  } else if (!run.ParseFromString(*content)) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": not a ProgramRun"));
-  }
-  return run;
-}
 
 std::string ReportText(const ProgramReport& report, const v1::Finished& finished) {
   nlohmann::json kept = nlohmann::json::array();
@@ -58,9 +35,9 @@ std::string ReportText(const ProgramReport& report, const v1::Finished& finished
 }  // namespace
 
 int RunProgramOnce(const ProgramOnceOptions& options, std::ostream& errors) {
-  const auto run = ReadProgramRun(options.run);
-  if (!run.ok()) {
-    errors << run.status().message() << '\n';
+  v1::ProgramRun run;
+  if (const absl::Status status = ReadMessageFile(options.run, run); !status.ok()) {
+    errors << status.message() << '\n';
     return kBadSpec;
   }
   std::ofstream file;
@@ -73,7 +50,7 @@ int RunProgramOnce(const ProgramOnceOptions& options, std::ostream& errors) {
   }
   std::ostream& out = options.output.empty() ? std::cout : file;
   out << "load_step";
-  for (const std::string& name : run->observables()) out << ',' << name;
+  for (const std::string& name : run.observables()) out << ',' << name;
   out << std::endl;
   Programs programs({.fetch = [&options](const std::string& digest,
                                          std::stop_token) -> absl::StatusOr<std::string> {
@@ -94,7 +71,7 @@ int RunProgramOnce(const ProgramOnceOptions& options, std::ostream& errors) {
     out << row << std::endl;  // a reader sees each state when it is reached
   };
   ProgramReport report;
-  const v1::Finished finished = programs.Evaluate(*run, 1, write, {}, &report);
+  const v1::Finished finished = programs.Evaluate(run, 1, write, {}, &report);
   if (!options.report.empty()) {
     std::ofstream(options.report) << ReportText(report, finished) << '\n';
   }

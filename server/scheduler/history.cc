@@ -185,10 +185,10 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     return without_weight.count(key.sample) > 0;
   });
   for (const auto& key : WithStatus(evaluations, store::EvaluationStatus::kUnknown)) {
-    if (place.count(key.sample) > 0) history.unknown.insert(key.sample);
-  }
-  for (const int sample : history.unknown) {
-    const auto [k, row] = place.at(sample);
+    const auto found = place.find(key.sample);
+    if (found == place.end()) continue;  // kept from before, or of an iteration left out
+    history.unknown.insert(key.sample);
+    const auto [k, row] = found->second;
     std::vector<char>& aside = history.iterations[k].aside;
     aside.resize(static_cast<std::size_t>(history.iterations[k].parameters.rows()), 0);
     aside[static_cast<std::size_t>(row)] = 1;

@@ -306,10 +306,12 @@ class Planner {
     posterior.set_unknown(static_cast<int>(history_.unknown.size()));
     posterior.set_unknown_mass(mass);
     const std::string held =
-        std::isnan(mass) ? "what they could hold of the posterior is not known"
-                         : absl::StrCat("they could hold ", mass, " of the posterior mass at most");
+        std::isnan(mass)
+            ? "what they could hold of the posterior is not known: not converged"
+            : absl::StrCat("were they as likely as the best that finished, they would hold ", mass,
+                           " of the posterior mass");
     const std::string verdict =
-        mass <= MayLeaveOut()
+        std::isnan(mass) || mass <= MayLeaveOut()
             ? "."
             : absl::StrCat(", more than the ", MayLeaveOut(),
                            " that may be left out (early_stopping.discard_at_most): not converged. "

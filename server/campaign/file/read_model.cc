@@ -391,8 +391,9 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign,
 }
 
 // Keys that only a program's model has.
-constexpr std::array kProgramKeys = {"command", "files",      "templates", "keep",    "checkpoint",
-                                     "states",  "persistent", "limits",    "version", "numerics"};
+constexpr std::array kProgramKeys = {"command",    "files",    "templates",  "keep",
+                                     "checkpoint", "states",   "persistent", "limits",
+                                     "version",    "numerics", "next"};
 
 SayOfTied SayAt(const MapReader& parameters) {
   return [&parameters](const std::string& name, const std::string& message) {

@@ -65,49 +65,6 @@ std::vector<HeldParameter> HeldParametersOf(const Campaign& campaign) {
   return held;
 }
 
-// The key `effects`: what some of the rows have and the model that is calibrated lacks.
-void ReadHeldEffects(MapReader& map, const ReadContext& context, Campaign& campaign) {
-  auto effects = map.Map("effects");
-  if (!effects) return;
-  const std::vector<std::string> names = effects->Keys();
-  for (const std::string& name : names) {
-    auto one = effects->Map(name);
-    if (!one) continue;
-    dem::UserEffect effect;
-    effect.info.name = name;
-    effect.info.kind = "held";  // by rows, and unknown to the engine
-    effect.info.reference = "runs made elsewhere";
-    effect.info.description = one->Text("description").value_or("");
-    if (name.find('.') != std::string::npos) {
-      effects->Problem(name, "an effect's name has no dot: what stands behind it is a parameter");
-    } else if (dem::FindEffect(name) != nullptr) {
-      effects->Problem(name, "is an effect of this build; call that of your runs another");
-    }
-    ReadEffectParameters(*one, context.is_new(), effect.info);
-    effect.info.excludes = one->TextList("excludes").value_or(std::vector<std::string>{});
-    for (const std::string& other : effect.info.excludes) {
-      if (other == name || std::find(names.begin(), names.end(), other) == names.end()) {
-        one->Problem("excludes", absl::StrCat(Quoted(other), " is none of the others; ",
-                                              Suggestion(other, names)));
-      }
-    }
-    if (one->TrueOrFalse("acts").value_or(false)) {
-      campaign.model.effects.push_back(name);
-      for (const dem::ParameterInfo& own : effect.info.parameters) {
-        const std::string dotted = absl::StrCat(name, ".", own.name);
-        if (std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
-                        [&dotted](const auto& parameter) { return parameter.name == dotted; }))
-          continue;
-        one->Problem("acts", absl::StrCat("its parameter ", dotted,
-                                          " is not calibrated; add it to parameters"));
-      }
-    }
-    one->Finish();
-    campaign.model.user_effects.push_back(std::move(effect));
-  }
-  effects->Finish();
-}
-
 // The table of parameters, one row per sample.
 class ParametersReader {
  public:
@@ -293,7 +250,11 @@ void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& ca
   if (!model) return;
   auto map = model->Map("precomputed");
   if (!map) return;
-  ReadHeldEffects(*map, context, campaign);
+  ReadHeldEffects(*map, context.is_new(), "runs made elsewhere", campaign.model);
+  for (const std::string& missing : NotCalibratedOfActing(campaign)) {
+    map->Problem("effects",
+                 absl::StrCat("parameter ", missing, " is not calibrated; add it to parameters"));
+  }
   const RunTableKeys keys = ReadRunTableKeys(*map);
   CheckKeyNames(*map, keys, campaign, context.is_new());
   ParametersReader parameters(*map, keys, context, campaign);

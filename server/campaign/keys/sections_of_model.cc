@@ -86,6 +86,7 @@ Section Model() {
           {"version", Text(), "", "part of what a run is, for what the files do not show"},
           {"numerics", MapOf("program_numerics"), "none",
            "settings of the code that should not matter"},
+          {"next", ListOf(MapOf("program_next")), "none", "tests that may be proposed"},
       }};
 }
 
@@ -232,6 +233,17 @@ Section ProgramNumericsKeys() {
           {{"NAME", MapOf("program_number"), "", "a parameter of the program"}}};
 }
 
+Section ProgramNext() {
+  return {"program_next",
+          "model.next[]",
+          {
+              {"name", Text(), kRequired, "of the test"},
+              {"settings", MapOf("told_settings"), "none", "what the program is told"},
+              {"control", Text(), kRequired, "the column that drives it"},
+              {"values", ListOf(Text()), kRequired, "of the control, with their unit"},
+          }};
+}
+
 Section ProgramNumber() {
   return {"program_number",
           "model.numerics.NAME",
@@ -248,7 +260,7 @@ std::vector<Section> SectionsOfModel() {
           ParameterKeys(), Tie(),           Materials(),        Material(),
           Pairs(),         Pair(),          PrecomputedKeys(),  HeldEffects(),
           HeldEffect(),    ProgramStates(), ProgramLimitKeys(), ProgramNumericsKeys(),
-          ProgramNumber()};
+          ProgramNumber(), ProgramNext()};
 }
 
 }  // namespace calib::campaign

@@ -225,6 +225,8 @@ TEST(ProgramCampaign, RefusesWhatCannotBeMeantInOneSentenceEach) {
                       "    control: pull\n    realizations: {packing: [a.txt]}\n"),
        "stands under settings as well"},
       {SpoiledProgram("sign: positive}}}", "sign: positive}}, acts: true}"), "is not calibrated"},
+      {SpoiledProgram("    rolling: {p", "    rolling_resistance: {p"),
+       "is an effect of this build; call that of your runs another"},
       {SpoiledProgram("force: {noise", "pull: {noise"), "is the control"},
       {absl::StrReplaceAll(ProgramYaml(),
                            {{"  command: [python3, spring.py, \"--seed={seed}\"]\n", ""}}),
@@ -236,6 +238,19 @@ TEST(ProgramCampaign, RefusesWhatCannotBeMeantInOneSentenceEach) {
   for (const auto& one : cases) {
     EXPECT_THAT(ProblemsOf(one.yaml, ProgramFiles()), HasSubstr(one.says));
   }
+}
+
+TEST(ProgramCampaign, TestsThatMayBeProposedAreHeldToTheirForm) {
+  const auto with = [](const std::string& next) {
+    return SpoiledProgram("  version:", "  next: " + next + "\n  version:");
+  };
+  EXPECT_EQ(ProblemsOf(with("[{name: oedometer, settings: {pressure: 0.1 MPa}, control: pull, "
+                            "values: [1 mm, 2 mm]}]"),
+                       ProgramFiles()),
+            "");
+  EXPECT_THAT(ProblemsOf(with("[{name: oedometer, control: pull}]"), ProgramFiles()),
+              HasSubstr("model.next[1].values: is missing"));
+  EXPECT_THAT(ProblemsOf(with("oedometer"), ProgramFiles()), HasSubstr("has to be a list"));
 }
 
 TEST(ProgramCampaign, SaysOfAScriptBesideTheCampaignThatItIsNotBrought) {

@@ -231,6 +231,11 @@ void SimulatedService::Step(Simulated& worker, std::mt19937& random) {
       }));
   // Load steps are numbered from 0 here.
   const int until = busy.lease.has_rest_after() ? busy.lease.rest_after() + 1 : all;
+  if (fails && busy.sent > 0 && fails(busy.lease.spec())) {
+    SendEnd(worker.session, busy.lease.attempt(), v1::Finished::OUTCOME_MODEL_FAILED,
+            "ended by SIGSEGV");
+    return;
+  }
   if (busy.sent < until) {
     const int count = 1 + static_cast<int>(random() % static_cast<unsigned>(until - busy.sent));
     SendStates(worker.session, busy.lease, busy.sent, count);

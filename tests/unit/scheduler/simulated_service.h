@@ -102,6 +102,8 @@ class SimulatedService {
   double repeat_scatter = 0;
   /// That every run is said to have taken.
   double core_seconds = 0;
+  /// Runs that fail in RunToEnd() after their first states, as a program does; none.
+  std::function<bool(const v1::AttemptSpec&)> fails;
   /// Load steps that workers of RunToEnd() had to compute: without those of a checkpoint.
   int computed = 0;
 

@@ -207,42 +207,6 @@ std::optional<ProgramTable> ReadStatesTable(MapReader& model) {
   return table;
 }
 
-// The key `effects`: what the program switches on when it is asked to.
-void ReadProgramEffects(MapReader& model, const ReadContext& context, Campaign& campaign) {
-  auto effects = model.Map("effects");
-  if (!effects) return;
-  const std::vector<std::string> names = effects->Keys();
-  for (const std::string& name : names) {
-    auto one = effects->Map(name);
-    if (!one) continue;
-    dem::UserEffect effect;
-    effect.info.name = name;
-    effect.info.kind = "held";  // by the program, and unknown to the engine
-    effect.info.reference = "the program of the campaign";
-    effect.info.description = one->Text("description").value_or("");
-    if (name.find('.') != std::string::npos) {
-      effects->Problem(name, "an effect's name has no dot: what stands behind it is a parameter");
-    } else if (const dem::EffectInfo* known = dem::FindEffect(name);
-               known != nullptr && known->kind == "measurement") {
-      effects->Problem(name,
-                       "is an effect of the measurement, which is computed on the program's "
-                       "curves; call that of your program another");
-    }
-    ReadEffectParameters(*one, context.is_new(), effect.info);
-    effect.info.excludes = one->TextList("excludes").value_or(std::vector<std::string>{});
-    for (const std::string& other : effect.info.excludes) {
-      if (other == name || std::find(names.begin(), names.end(), other) == names.end()) {
-        one->Problem("excludes", absl::StrCat(Quoted(other), " is none of the others; ",
-                                              Suggestion(other, names)));
-      }
-    }
-    if (one->TrueOrFalse("acts").value_or(false)) campaign.model.effects.push_back(name);
-    one->Finish();
-    campaign.model.user_effects.push_back(std::move(effect));
-  }
-  effects->Finish();
-}
-
 void ReadNumerics(MapReader& model, Program& program) {
   auto map = model.Map("numerics");
   if (!map) return;
@@ -257,6 +221,29 @@ void ReadNumerics(MapReader& model, Program& program) {
     if (null && sd) program.numerics[name] = {.null = *null, .sd = *sd};
   }
   map->Finish();
+}
+
+// Tests that could be proposed: held to their form, and to nothing else yet.
+void ReadNext(MapReader& model) {
+  const YamlNode* node = model.Find("next");
+  if (node == nullptr) return;
+  if (node->kind != YamlNode::Kind::kSequence) {
+    model.Problem("next", "has to be a list of tests, each beginning with '- name: ...'");
+    return;
+  }
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    MapReader test(node->items[i], absl::StrCat(model.PathOf("next"), "[", i + 1, "]"),
+                   SectionOf("program_next"), model.problems());
+    test.RequiredText("name", "what the test is called");
+    test.RequiredText("control", "the column that drives it");
+    test.Require("values", "of the control, e.g. [1 percent, 2 percent]");
+    test.TextList("values");
+    if (auto settings = test.Map("settings")) {
+      settings->Ignore(settings->Keys());
+      settings->Finish();
+    }
+    test.Finish();
+  }
 }
 
 }  // namespace
@@ -282,8 +269,9 @@ void ReadProgram(MapReader& model, ReadContext& context, Campaign& campaign) {
   program.states = ReadStatesTable(model);
   program.version = model.Text("version").value_or("");
   ReadLimitsOf(model, program.limits);
-  ReadProgramEffects(model, context, campaign);
+  ReadHeldEffects(model, context.is_new(), "the program of the campaign", campaign.model);
   ReadNumerics(model, program);
+  ReadNext(model);
   if (model.Has("command")) CheckCommand(model, context, program);
   if (program.persistent && program.states) {
     model.Problem("states",
@@ -326,16 +314,10 @@ void CheckProgram(const MapReader& campaign_map, const Campaign& campaign) {
       }
     }
   }
-  for (const std::string& effect : campaign.model.effects) {
-    const dem::EffectInfo* info = dem::FindEffect(campaign.model.user_effects, effect);
-    if (info == nullptr) continue;
-    for (const dem::ParameterInfo& own : info->parameters) {
-      const std::string dotted = absl::StrCat(effect, ".", own.name);
-      if (own.default_value || parameters.contains(dotted)) continue;
-      campaign_map.Problem("parameters",
-                           absl::StrCat(dotted, ", of the effect ", effect,
-                                        " that acts, is not calibrated; add it to parameters"));
-    }
+  for (const std::string& missing : NotCalibratedOfActing(campaign)) {
+    campaign_map.Problem("parameters", absl::StrCat(missing,
+                                                    " is not calibrated; add it to "
+                                                    "parameters"));
   }
 }
 

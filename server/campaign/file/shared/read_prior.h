@@ -19,7 +19,8 @@ bool HoldsMass(const inference::Prior& prior, const std::string& key, MapReader&
 std::optional<inference::Prior> ReadPrior(const YamlNode& node, const std::string& path,
                                           const std::string& si_unit, ProblemList& problems);
 
-/// The SI unit that the numbers of a prior carry, or that its `unit` says; "1" where they are plain.
+/// The SI unit that the numbers of a prior carry, or that its `unit` says; "1" where they are
+/// plain.
 std::string UnitOfPrior(const YamlNode& node);
 
 /// What stands at `equal_to` of a parameter that follows from others. Empty: there is no such key,

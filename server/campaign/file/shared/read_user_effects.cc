@@ -335,4 +335,53 @@ void ReadUserEffects(MapReader& model_map, const ReadContext& context, dem::Mode
   effects->Finish();
 }
 
+void ReadHeldEffects(MapReader& map, bool is_new, const std::string& reference, dem::Model& model) {
+  auto effects = map.Map("effects");
+  if (!effects) return;
+  const std::vector<std::string> names = effects->Keys();
+  for (const std::string& name : names) {
+    auto one = effects->Map(name);
+    if (!one) continue;
+    dem::UserEffect effect;
+    effect.info.name = name;
+    effect.info.kind = "held";  // by the runs, and unknown to the engine
+    effect.info.reference = reference;
+    effect.info.description = one->Text("description").value_or("");
+    if (name.find('.') != std::string::npos) {
+      effects->Problem(name, "an effect's name has no dot: what stands behind it is a parameter");
+    } else if (dem::FindEffect(name) != nullptr) {
+      effects->Problem(name, "is an effect of this build; call that of your runs another");
+    }
+    ReadEffectParameters(*one, is_new, effect.info);
+    effect.info.excludes = one->TextList("excludes").value_or(std::vector<std::string>{});
+    for (const std::string& other : effect.info.excludes) {
+      if (other == name || std::find(names.begin(), names.end(), other) == names.end()) {
+        one->Problem("excludes", absl::StrCat(Quoted(other), " is none of the others; ",
+                                              Suggestion(other, names)));
+      }
+    }
+    if (one->TrueOrFalse("acts").value_or(false)) model.effects.push_back(name);
+    one->Finish();
+    model.user_effects.push_back(std::move(effect));
+  }
+  effects->Finish();
+}
+
+std::vector<std::string> NotCalibratedOfActing(const Campaign& campaign) {
+  std::vector<std::string> missing;
+  for (const std::string& effect : campaign.model.effects) {
+    const dem::EffectInfo* info = dem::FindEffect(campaign.model.user_effects, effect);
+    if (info == nullptr) continue;
+    for (const dem::ParameterInfo& own : info->parameters) {
+      const std::string dotted = absl::StrCat(effect, ".", own.name);
+      const bool calibrated = std::any_of(
+          campaign.parameters.begin(), campaign.parameters.end(),
+          [&dotted](const CalibratedParameter& parameter) { return parameter.name == dotted; });
+      if (calibrated || own.default_value || FindTied(campaign, dotted) != nullptr) continue;
+      missing.push_back(absl::StrCat(dotted, ", of the effect ", effect, " that acts,"));
+    }
+  }
+  return missing;
+}
+
 }  // namespace calib::campaign

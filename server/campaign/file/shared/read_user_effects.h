@@ -19,4 +19,14 @@ void ReadEffectParameters(MapReader& map, bool is_new, dem::EffectInfo& effect);
 /// strength holds what the screen tries. Call before effects and parameters are read.
 void ReadUserEffects(MapReader& model_map, const ReadContext& context, dem::Model& model);
 
+/// Reads `effects` of a map: what runs have that are not of this program's DEM (made elsewhere, or
+/// by a program), each with strengths, `excludes` and whether it `acts`. Declares them in
+/// model.user_effects, of the kind "held" and without a formula; those that act also join
+/// model.effects. reference: where they come from.
+void ReadHeldEffects(MapReader& map, bool is_new, const std::string& reference, dem::Model& model);
+
+/// Parameters of effects that act and are neither calibrated nor have a default, dotted, with the
+/// name of their effect in words. Of a campaign whose effects are held.
+std::vector<std::string> NotCalibratedOfActing(const Campaign& campaign);
+
 }  // namespace calib::campaign
