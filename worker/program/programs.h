@@ -18,8 +18,8 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "calib/v1/worker.pb.h"
-#include "worker/program/child_process.h"
 #include "worker/program/fetch.h"
+#include "worker/program/launcher.h"
 #include "worker/program/running_program.h"
 #include "worker/program/scratch.h"
 

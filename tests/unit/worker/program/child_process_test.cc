@@ -1,5 +1,3 @@
-#include "worker/program/child_process.h"
-
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -7,6 +5,7 @@
 #include <thread>
 
 #include "tests/unit/worker/program/program_of_test.h"
+#include "worker/program/launcher.h"
 
 namespace calib::worker {
 namespace {
