@@ -146,6 +146,20 @@ TEST_F(StoreTest, StateThatArrivesTwiceIsHarmlessAndOtherBitsAreLogged) {
   EXPECT_NE(reader.Events(1)->front().what.find("nondeterminism"), std::string::npos);
 }
 
+TEST_F(StoreTest, WhatAProgramTellsBesidesAStateJoinsIt) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.PutState({.key = kKey, .load_step = 0, .observables = {1.0}, .others = R"({"grains":10})"},
+               10);
+    t.PutState({.key = kKey, .load_step = 0, .others = R"({"energy":0.5})"}, 11);
+  });
+  Reader reader = Read();
+  EXPECT_TRUE(reader.Events(1)->empty());
+  ASSERT_EQ(reader.States(1)->size(), 1U);
+  EXPECT_EQ(reader.States(1)->front().observables, std::vector<double>{1.0});
+  EXPECT_EQ(reader.States(1)->front().others, R"({"grains":10,"energy":0.5})");
+}
+
 TEST_F(StoreTest, AForgottenRequestIsNewAgain) {
   const RequestRecord one{.digest = "d", .answer = "c1"};
   Write([&](Transaction& t) {
