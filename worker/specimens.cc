@@ -8,6 +8,7 @@
 #include "dem/geometry/stl_file.h"
 #include "dem/registry/catalog.h"
 #include "dem/simulate/packing_generator.h"
+#include "proto/rpc/digest.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
@@ -16,10 +17,10 @@ namespace {
 std::string KeyOf(const v1::AttemptSpec& spec) {
   const dem::TestInfo* test = dem::FindTest(spec.test());
   const char* kind = test != nullptr && test->poured ? "sizes " : "recipe ";
-  std::string key = spec.has_recipe() ? absl::StrCat(kind, spec.recipe().SerializeAsString())
+  std::string key = spec.has_recipe() ? absl::StrCat(kind, rpc::BytesOf(spec.recipe()))
                                       : spec.packing_digest();
   for (const v1::Mesh& mesh : spec.meshes()) {
-    absl::StrAppend(&key, " mesh ", mesh.SerializeAsString());
+    absl::StrAppend(&key, " mesh ", rpc::BytesOf(mesh));
   }
   return key;
 }

@@ -1,5 +1,7 @@
 #include "proto/rpc/digest.h"
 
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -43,6 +45,17 @@ std::string Sha256Hex(std::string_view content) {
   Sha256 digest;
   digest.Update(content);
   return digest.Finish();
+}
+
+std::string BytesOf(const google::protobuf::MessageLite& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    message.SerializeToCodedStream(&coded);
+  }
+  return bytes;
 }
 
 }  // namespace calib::rpc

@@ -1,8 +1,5 @@
 #include "server/messages/attempt_spec.h"
 
-#include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -12,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
+#include "proto/rpc/digest.h"
 #include "server/campaign/model/race.h"
 #include "server/campaign/model/run_settings.h"
 #include "server/campaign/model/sha256.h"
@@ -98,18 +96,6 @@ bool IsDeclared(const campaign::Campaign& campaign, const std::string& effect) {
   const auto& declared = campaign.model.user_effects;
   return std::any_of(declared.begin(), declared.end(),
                      [&effect](const dem::UserEffect& own) { return own.info.name == effect; });
-}
-
-// The same bytes for equal messages.
-std::string BytesOf(const google::protobuf::Message& message) {
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream coded(&stream);
-    coded.SetSerializationDeterministic(true);  // maps in the order of their keys
-    message.SerializeToCodedStream(&coded);
-  }
-  return bytes;
 }
 
 // Declared effects that the model does not use have no part in what a run is.
@@ -274,7 +260,7 @@ v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const camp
 std::string SpecDigest(v1::AttemptSpec spec) {
   spec.clear_experiment();
   spec.clear_threads();
-  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", BytesOf(spec)));
+  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", rpc::BytesOf(spec)));
 }
 
 std::string RunDigest(v1::Lease run) {
@@ -284,7 +270,7 @@ std::string RunDigest(v1::Lease run) {
     program.clear_limits();
     program.clear_limit_diverges();
     program.clear_keep();
-    return campaign::Sha256Hex(absl::StrCat("program\n", BytesOf(program)));
+    return campaign::Sha256Hex(absl::StrCat("program\n", rpc::BytesOf(program)));
   }
   return SpecDigest(std::move(*run.mutable_spec()));
 }

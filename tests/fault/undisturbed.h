@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "proto/rpc/digest.h"
 #include "tests/support/deployment.h"
 #include "tests/support/small_campaign.h"
 
@@ -85,7 +86,7 @@ inline std::set<std::string> StatesNow(Client& client) {
     for (const v1::SampleStates& of_sample : *states) {
       for (const v1::State& state : of_sample.states()) {
         seen.insert(std::to_string(of_sample.sample()) + " " + of_sample.experiment() + " " +
-                    state.SerializeAsString());
+                    rpc::BytesOf(state));
       }
     }
   }

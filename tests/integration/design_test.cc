@@ -2,6 +2,7 @@
 // workers.
 #include <gtest/gtest.h>
 
+#include "proto/rpc/digest.h"
 #include "server/campaign/file/derive.h"
 #include "server/client/laboratory.h"
 #include "server/client/load_view.h"
@@ -37,11 +38,11 @@ std::string BitsOf(const report::CampaignView& view) {
   std::string bytes;
   for (v1::Sample sample : view.samples) {
     sample.clear_attempts();
-    bytes += sample.SerializeAsString();
+    bytes += rpc::BytesOf(sample);
   }
   for (const auto& [key, history] : view.states) {
     bytes += key.first + std::to_string(key.second);
-    for (const v1::State& state : history.states) bytes += state.SerializeAsString();
+    for (const v1::State& state : history.states) bytes += rpc::BytesOf(state);
   }
   return bytes;
 }
@@ -96,8 +97,8 @@ void Grow(int workers, bool killed, std::string& bits) {
   EXPECT_EQ(again->samples[2].purpose(), "main");
   EXPECT_EQ(again->samples[2].stream(), 5);
   // An effect and numerics that are in the run are in its readings.
-  EXPECT_NE(again->states.at({"tx", 0}).states.back().SerializeAsString(),
-            again->states.at({"tx", 1}).states.back().SerializeAsString());
+  EXPECT_NE(rpc::BytesOf(again->states.at({"tx", 0}).states.back()),
+            rpc::BytesOf(again->states.at({"tx", 1}).states.back()));
   EXPECT_TRUE(laboratory.Finished("c2").status().message().find("is no calibration but a trial") !=
               absl::string_view::npos);
   bits = BitsOf(*again);

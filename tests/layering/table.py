@@ -28,7 +28,7 @@ server/campaign   | {CAMPAIGN_OF_DEM} inference                                 
 server/access     |                                                                        | openssl spdlog
 server/campaign/file/text |                                                                | yaml-cpp
 server/campaign/file/program | {CAMPAIGN_OF_DEM} inference server/campaign                                  | nlohmann
-server/messages   | dem proto/calib server/campaign                                        | chrono nlohmann
+server/messages   | dem proto/calib proto/rpc server/campaign                              | chrono nlohmann
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
 server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
 server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "proto/rpc/digest.h"
 #include "server/service/state_folder.h"
 
 namespace calib::testing {
@@ -74,14 +75,14 @@ absl::StatusOr<std::string> Fingerprint(Client& client, const std::string& campa
     }
   }
   posterior->clear_core_hours();
-  std::string bytes = posterior->SerializeAsString();
+  std::string bytes = rpc::BytesOf(*posterior);
   for (v1::Sample& sample : *samples) {
     sample.clear_attempts();
-    bytes += sample.SerializeAsString();
+    bytes += rpc::BytesOf(sample);
   }
   for (v1::SampleStates& of_sample : *states) {
     of_sample.clear_core_seconds();
-    bytes += of_sample.SerializeAsString();
+    bytes += rpc::BytesOf(of_sample);
   }
   return bytes;
 }

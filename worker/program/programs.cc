@@ -84,7 +84,7 @@ std::string IdentityOf(const v1::ProgramRun& program, const std::vector<std::str
   alike.set_version(program.version());
   alike.set_checkpoint(program.checkpoint());
   alike.set_threads(program.threads());
-  return rpc::Sha256Hex(alike.SerializeAsString());
+  return rpc::Sha256Hex(rpc::BytesOf(alike));
 }
 
 absl::Status CheckProgram(const v1::ProgramRun& program) {
