@@ -135,6 +135,32 @@ absl::Status ValidateNoiseGroups(const DataSet& data) {
   return absl::OkStatus();
 }
 
+absl::Status ValidateModelErrors(const DataSet& data) {
+  std::map<Group, int> seen;
+  for (const ModelError& error : data.model_errors) {
+    if (error.members.empty()) return absl::InvalidArgumentError("a model error has no members.");
+    if (!error.relative && !error.absolute) {
+      return absl::InvalidArgumentError("a model error is neither relative nor absolute.");
+    }
+    for (const auto& scale : {error.relative, error.absolute}) {
+      if (!scale) continue;
+      RETURN_IF_ERROR(scale->prior.Validate());
+      if (!(scale->prior.min >= 0)) {
+        return absl::InvalidArgumentError(absl::StrCat("the prior of a model error begins at ",
+                                                       scale->prior.min,
+                                                       "; a standard deviation is not negative."));
+      }
+    }
+    for (const Group& member : error.members) {
+      if (++seen[member] == 1) continue;
+      return absl::InvalidArgumentError(absl::StrCat("observable ", member.second,
+                                                     " of experiment ", member.first,
+                                                     " stands in two model errors."));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::vector<NoiseGroup> NoiseGroupsOf(const DataSet& data) {
@@ -242,7 +268,8 @@ absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
   if (noise == NoiseMode::kEssTarget) return absl::OkStatus();
   RETURN_IF_ERROR(ValidateCorrelations(data));
   RETURN_IF_ERROR(ValidateCovariances(data));
-  return ValidateNoiseGroups(data);
+  RETURN_IF_ERROR(ValidateNoiseGroups(data));
+  return ValidateModelErrors(data);
 }
 
 DataSet Restricted(const DataSet& data, const std::vector<int>& readings) {

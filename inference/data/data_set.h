@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "inference/data/model_error.h"
 
 namespace calib::inference {
 
@@ -73,6 +74,9 @@ enum class NoiseMode {
   /// a wanted share of the samples effective: a tempering, not an estimate.
   ///                                                                         [Cheng 2019, sec. 3.4]
   kEssTarget,
+  /// The stated standard deviations and an inferred error of the model beside them, integrated out
+  /// over its prior (model_error.h); readings that stand in none have their stated ones.
+  kModelError,
 };
 
 /// The readings of all experiments with what is stated of their errors.
@@ -83,6 +87,8 @@ struct DataSet {
   /// For NoiseMode::kInferred: who shares a factor; an (experiment, observable) that stands in no
   /// group has a factor of its own.
   std::vector<NoiseGroup> noise_groups = {};
+  /// For NoiseMode::kModelError; no (experiment, observable) stands in two.
+  std::vector<ModelError> model_errors = {};
   /// For NoiseMode::kEssTarget: w_j, indexed [experiment][observable]; it multiplies the variance.
   /// Empty: all one.
   std::vector<std::vector<double>> ess_weights;
@@ -93,7 +99,9 @@ struct DataSet {
 /// zero with kEssTarget), correlation length that is not positive or given twice, correlated
 /// readings at one and the same control, a covariance that is not symmetric, does not fit its
 /// readings or stands beside another one or a correlation length, a noise group without members or
-/// with one that stands in another, a factor's prior whose shape or rate is not positive,
+/// with one that stands in another, a factor's prior whose shape or rate is not positive, a model
+/// error without members, without a part, with a member that stands in another or a prior that
+/// begins below zero,
 /// ess_weights that are not positive or missing for an observable.
 absl::Status ValidateData(const DataSet& data, NoiseMode noise);
 

@@ -32,9 +32,14 @@ OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
 ///              with the proper |2 pi S|^(-1/2)
 ///   kInferred: N(y_g; x_g, f S_g) with f common to the groups of a NoiseGroup and integrated out
 ///              over its VarianceFactorPrior: a multivariate t density
+///   kModelError: N(y_g; x_g, S_g) with each sd_i raised by the standard deviations of a
+///   ModelError,
+///              common to its members and integrated out over their prior by the levels of
+///              CellsOf: a mixture of as many normal densities, at the cost of as many likelihoods
 /// Written with S = L L^T and z = L^-1 (y - x), reading k of a group contributes a function of z_0
-/// ... z_k alone (kInferred: of the noise group), its density conditional on the earlier readings.
-/// Summed along the processing order the increments are the exact density after every reading,
+/// ... z_k alone (kInferred, kModelError: of all readings in common), its density conditional on
+/// the earlier readings. Summed along the processing order the increments are the exact density
+/// after every reading,
 /// whatever the order [Cheng 2019, Eqs. 14 and 15, normaliser corrected]. Errors that are
 /// correlated exponentially along a control that only grows (or falls) are a Markov chain: z_k
 /// needs the reading before alone, and the cost is O(T); a covariance given in full costs O(T^2) a
@@ -42,8 +47,8 @@ OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
 /// Create; thread safety: const.
 class GaussianLikelihood {
  public:
-  /// The likelihood of `data`, of which it keeps no reference. noise: kGiven or kInferred (for
-  /// kEssTarget pass WithRelativeErrors(data, sigma) and kGiven). Errors: INVALID_ARGUMENT from
+  /// The likelihood of `data`, of which it keeps no reference. noise: all but kEssTarget (for which
+  /// pass WithRelativeErrors(data, sigma) and kGiven). Errors: INVALID_ARGUMENT from
   /// ValidateData, or when correlated readings lie so close that their covariance is singular.
   static absl::StatusOr<GaussianLikelihood> Create(const DataSet& data, NoiseMode noise);
 
@@ -68,7 +73,8 @@ class GaussianLikelihood {
   /// The largest value LogLikelihood can still take for each row of N x T predictions once those
   /// that are not finite yet arrive; N entries. Readings of an (experiment, observable) from the
   /// first missing one on are given zero residual given its past, z = 0: each increment is largest
-  /// there, and with kInferred the marginal falls with every z^2.
+  /// there, and with kInferred the marginal falls with every z^2, with kModelError that of each
+  /// level.
   Eigen::VectorXd LogLikelihoodBound(const Eigen::MatrixXd& predictions) const;
 
   /// Posterior of the variance factors of G noise groups (NoiseGroupsOf), given each of N rows of
@@ -80,6 +86,18 @@ class GaussianLikelihood {
   /// The posterior of the variance factors for N x T predictions. For kInferred alone; no groups
   /// (G = 0) with kGiven.
   FactorPosterior VarianceFactors(const Eigen::MatrixXd& predictions) const;
+
+  /// What is known of the model error of one of data.model_errors that has readings.
+  struct ErrorLevels {
+    std::size_t error = 0;  ///< index into data.model_errors
+    ErrorCells cells{};     ///< their levels are those of log_posterior
+    /// N x levels: ln of the prior mass of each level times p(its readings | x, level), readings
+    /// reached alone.
+    Eigen::MatrixXd log_joint{};
+  };
+  /// The model errors given each of N rows of predictions (N x T). For kModelError alone; none with
+  /// another noise.
+  std::vector<ErrorLevels> ModelErrors(const Eigen::MatrixXd& predictions) const;
 
  private:
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -99,6 +117,14 @@ class GaussianLikelihood {
     std::vector<int> readings;     // indices in processing order
     Eigen::VectorXd log_constant;  // ln Gamma(shape + (k + 1) / 2) - ln Gamma(shape + k / 2)
   };
+  struct LevelGroup {           // kModelError: readings that share a model error
+    std::size_t error = 0;      // index into the data's
+    std::vector<int> readings;  // indices in processing order
+    ErrorCells cells;
+    Eigen::VectorXd log_mass;              // by level
+    Eigen::MatrixXd sd;                    // readings x levels
+    std::vector<GaussianLikelihood> unit;  // one: of these readings, all zero with an sd of one
+  };
   enum class Missing { kStop, kZeroResidual };
 
   using Rows = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
@@ -112,6 +138,12 @@ class GaussianLikelihood {
   void WhitenLink(const Rows& predictions, int t, Eigen::Ref<Eigen::ArrayXd> z) const;
   Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
   void IntegrateFactor(const FactorGroup& group, MutableRows z) const;
+  // Increments of the group's readings at a level; NaN where not reached, or zero residual there.
+  Eigen::MatrixXd AtLevel(const LevelGroup& group, Eigen::Index level, const Rows& predictions,
+                          Missing missing) const;
+  void IntegrateLevels(const LevelGroup& group, const Rows& predictions, Missing missing,
+                       MutableRows increments) const;
+  absl::Status AddLevels(const DataSet& data);
 
   int readings_ = 0;
   bool inferred_ = false;
@@ -120,7 +152,8 @@ class GaussianLikelihood {
   Eigen::VectorXd log_diagonal_;  // ln L_kk by reading
   std::vector<Link> links_;       // by reading
   std::vector<Group> groups_;
-  std::vector<FactorGroup> factors_;  // empty: kGiven
+  std::vector<FactorGroup> factors_;  // kInferred alone
+  std::vector<LevelGroup> levels_;    // kModelError alone
 };
 
 }  // namespace calib::inference

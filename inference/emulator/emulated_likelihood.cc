@@ -15,6 +15,32 @@ using Eigen::Index;
 
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
+// Place of the group whose members a curve is among; -1: none.
+template <typename Group>
+int PlaceOf(const std::pair<int, int>& curve, const std::vector<Group>& groups) {
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto& members = groups[g].members;
+    if (std::find(members.begin(), members.end(), curve) != members.end()) {
+      return static_cast<int>(g);
+    }
+  }
+  return -1;
+}
+
+// Errors over stated ones, readings x levels.
+Eigen::MatrixXd LargerErrors(const DataSet& data, const std::vector<int>& readings,
+                             const ErrorCells& cells) {
+  Eigen::MatrixXd larger(static_cast<Index>(readings.size()), cells.levels());
+  for (Index i = 0; i < larger.rows(); ++i) {
+    const Reading& reading =
+        data.readings[static_cast<std::size_t>(readings[static_cast<std::size_t>(i)])];
+    for (Index k = 0; k < larger.cols(); ++k) {
+      larger(i, k) = RaisedError(cells, k, reading.value, reading.sd) / reading.sd;
+    }
+  }
+  return larger;
+}
+
 }  // namespace
 
 absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& data,
@@ -31,13 +57,17 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
   likelihood.correlation_factor_ = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
 
   const std::vector<NoiseGroup> noise_groups = NoiseGroupsOf(data);
-  likelihood.groups_ = static_cast<int>(noise_groups.size());
+  likelihood.model_error_ = options.model_error;
+  std::vector<ErrorCells> cells;
+  for (const ModelError& error : data.model_errors) {
+    cells.push_back(options.model_error ? CellsOf(error, data) : ErrorCells{});
+  }
   for (const auto& [key, members] : GroupsOf(data)) {
     Form form;
-    for (std::size_t g = 0; g < noise_groups.size(); ++g) {
-      const auto& shared = noise_groups[g].members;
-      if (std::find(shared.begin(), shared.end(), key) != shared.end())
-        form.noise_group = static_cast<int>(g);
+    form.noise_group =
+        options.model_error ? PlaceOf(key, data.model_errors) : PlaceOf(key, noise_groups);
+    if (options.model_error && form.noise_group >= 0) {
+      form.larger = LargerErrors(data, members, cells[static_cast<std::size_t>(form.noise_group)]);
     }
     const auto size = static_cast<Index>(members.size());
     Eigen::MatrixXd covariance = options.correlated_noise ? ErrorCorrelation(data, key, members)
@@ -68,16 +98,30 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
 }
 
 void EmulatedLikelihood::Form::Sum() {
-  gram = whitened_basis.transpose() * whitened_basis;
   // One after the other: the last bits of a likelihood move proposals, and runs that follow them
   // part.
-  log_normaliser = 0;
-  for (const double log_of_sd : log_sd) log_normaliser -= log_of_sd;
+  double sds = 0;
+  for (const double log_of_sd : log_sd) sds -= log_of_sd;
   double pivots = 0;
   for (const double log_of_pivot : log_pivots) pivots += log_of_pivot;
-  log_normaliser -= pivots;
-  projection = whitened_basis.transpose() * residual;
-  square = residual.squaredNorm();
+  stated = {.gram = whitened_basis.transpose() * whitened_basis,
+            .projection = whitened_basis.transpose() * residual,
+            .square = residual.squaredNorm(),
+            .log_normaliser = sds - pivots};
+  at_level.clear();
+  if (larger.cols() == 0) return;
+  const auto whitener = whitening.triangularView<Eigen::Lower>();
+  const Eigen::MatrixXd basis = whitener.solve(whitened_basis);
+  const Eigen::VectorXd plain = whitener.solve(residual);
+  for (const auto& errors : larger.colwise()) {
+    const Eigen::VectorXd inverse = errors.cwiseInverse();
+    const Eigen::MatrixXd own_basis = whitener * (inverse.asDiagonal() * basis).eval();
+    const Eigen::VectorXd own_residual = whitener * inverse.cwiseProduct(plain).eval();
+    at_level.push_back({.gram = own_basis.transpose() * own_basis,
+                        .projection = own_basis.transpose() * own_residual,
+                        .square = own_residual.squaredNorm(),
+                        .log_normaliser = stated.log_normaliser - errors.array().log().sum()});
+  }
 }
 
 // W is lower: what the first readings of a group are whitened by does not depend on the others.
@@ -90,6 +134,7 @@ EmulatedLikelihood EmulatedLikelihood::First(Index readings) const {
     form.whitening = form.whitening.topLeftCorner(kept, kept).eval();
     form.whitened_basis.conservativeResize(kept, Eigen::NoChange);
     form.log_sd.conservativeResize(kept);
+    form.larger.conservativeResize(kept, Eigen::NoChange);
     form.log_pivots.conservativeResize(kept);
     form.residual.conservativeResize(kept);
     form.Sum();
@@ -124,6 +169,7 @@ EmulatedLikelihood EmulatedLikelihood::Of(const std::vector<Index>& readings) co
     form.whitened_basis = form.whitening * basis;
     form.residual = form.whitening * residual;
     form.log_sd = form.log_sd(kept).eval();
+    if (form.larger.cols() > 0) form.larger = form.larger(kept, Eigen::all).eval();
     std::vector<Index> own;
     own.reserve(kept.size());
     for (const Index i : kept) own.push_back(form.readings[static_cast<std::size_t>(i)]);
@@ -164,7 +210,7 @@ EmulatedLikelihood::Combined EmulatedLikelihood::Combine(const Eigen::VectorXd& 
 }
 
 Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& prediction,
-                                                  const Eigen::MatrixXd& factors) const {
+                                                  const Eigen::MatrixXd& noise) const {
   const Index q = prediction.mean.cols();
   Eigen::VectorXd result(prediction.mean.rows());
   Eigen::MatrixXd gram(q, q);
@@ -174,10 +220,20 @@ Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& predict
     projection.setZero();
     double sum = 0;
     for (const Form& form : forms_) {
-      const double factor = factors.cols() == 0 ? 1 : factors(i, form.noise_group);
-      gram += form.gram / factor;
-      projection += form.projection / factor;
-      sum += form.log_normaliser - 0.5 * form.square / factor -
+      const bool stated = noise.cols() == 0 || form.noise_group < 0;
+      if (stated || model_error_) {
+        const Sums& sums =
+            stated ? form.stated
+                   : form.at_level[static_cast<std::size_t>(noise(i, form.noise_group))];
+        gram += sums.gram;
+        projection += sums.projection;
+        sum += sums.log_normaliser - 0.5 * sums.square;
+        continue;
+      }
+      const double factor = noise(i, form.noise_group);
+      gram += form.stated.gram / factor;
+      projection += form.stated.projection / factor;
+      sum += form.stated.log_normaliser - 0.5 * form.stated.square / factor -
              0.5 * static_cast<double>(form.readings.size()) * std::log(factor);
     }
     result[i] =
@@ -192,9 +248,9 @@ Eigen::VectorXd EmulatedLikelihood::Misfit(const ScorePrediction& prediction) co
   Eigen::VectorXd projection = Eigen::VectorXd::Zero(q);
   double square = 0;
   for (const Form& form : forms_) {
-    gram += form.gram;
-    projection += form.projection;
-    square += form.square;
+    gram += form.stated.gram;
+    projection += form.stated.projection;
+    square += form.stated.square;
   }
   Eigen::VectorXd misfit(prediction.mean.rows());
   for (Index i = 0; i < misfit.size(); ++i) {
@@ -212,9 +268,9 @@ double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index r
   double sum = 0;
   for (const Form& form : forms_) {
     const Eigen::VectorXd residual = Whiten(form, z);
-    gram += form.gram;
+    gram += form.stated.gram;
     projection += form.whitened_basis.transpose() * residual;
-    sum += form.log_normaliser - 0.5 * residual.squaredNorm();
+    sum += form.stated.log_normaliser - 0.5 * residual.squaredNorm();
   }
   return sum +
          Combine(prediction.mean.row(row), prediction.sd.row(row), gram, projection).LogDensity();

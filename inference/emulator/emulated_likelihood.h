@@ -16,15 +16,17 @@ namespace calib::inference {
 ///   D^2 = diag(sd^2 + share * scatter_sd^2)
 /// with mean, basis B, remainder and error correlation C of the emulator, its prediction m, sd at a
 /// point, the noise's correlation R (identity, exponential along the control, or as given in full),
-/// and one variance factor per noise group in F. `share` is the part of a run's scatter that the
-/// measurement has as well. All that involves T is done once; a point then costs O(q^3).
-/// Immutable after Create; thread safety: const.
+/// and in F what multiplies the stated variances: one factor per noise group (kInferred), or by the
+/// level of a model error another one for each reading (kModelError). `share` is the part of a
+/// run's scatter that the measurement has as well. All that involves T is done once; a point then
+/// costs O(q^3). Immutable after Create; thread safety: const.
 class EmulatedLikelihood {
  public:
   /// How Create takes the data.
   struct Options {
     bool correlated_noise = true;  ///< false: as if the readings' errors were independent
     double scatter_share = 1;      ///< `share`, [0, 1]
+    bool model_error = false;      ///< of the data, beside the stated errors (kModelError)
     bool reversed = false;  ///< the data are Reversed() ones of those the emulator learned from
   };
   /// The likelihood of the data under the emulator; keeps no reference.
@@ -42,14 +44,12 @@ class EmulatedLikelihood {
   /// The likelihood of these readings alone, ascending indices; noise groups keep their places.
   EmulatedLikelihood Of(const std::vector<Eigen::Index>& readings) const;
 
-  /// Number of noise groups (NoiseGroupsOf), one variance factor each.
-  int groups() const { return groups_; }
-
   /// ln p(readings | point) of the measured readings (z = 0) at m points, in the readings' own
-  /// units, m entries. prediction: of the emulator at the points; factors: m x groups, > 0, of the
-  /// noise variance; 0 columns: all one.
+  /// units, m entries. prediction: of the emulator at the points; noise: m x noise groups
+  /// (NoiseGroupsOf), factors > 0 of the noise variance, or with model errors m x their number, the
+  /// place of a level in their cells (CellsOf); 0 columns: as stated.
   Eigen::VectorXd LogLikelihood(const ScorePrediction& prediction,
-                                const Eigen::MatrixXd& factors) const;
+                                const Eigen::MatrixXd& noise) const;
 
   /// chi^2 of the measured readings about the emulator's prediction at m points, by the covariance
   /// of the likelihood with all factors one, m entries; chi-squared distributed with T degrees of
@@ -64,18 +64,23 @@ class EmulatedLikelihood {
  private:
   // What is known of the readings of one (experiment, observable), whitened by
   // W = chol(R + diag(remainder))^-1.
+  struct Sums {
+    Eigen::MatrixXd gram;        // B^T W^T W B
+    Eigen::VectorXd projection;  // (W B)^T W r
+    double square = 0;           // |W r|^2
+    double log_normaliser = 0;   // minus the sum of ln sd + 1/2 ln 2 pi and of ln (W^-1)_kk
+  };
   struct Form {
     std::vector<Eigen::Index> readings;
-    int noise_group = 0;
+    int noise_group = 0;     // or model error; -1: none
+    Eigen::MatrixXd larger;  // readings x levels of the model error: errors over stated ones
+    std::vector<Sums> at_level;
     Eigen::MatrixXd whitening;       // W, lower
     Eigen::MatrixXd whitened_basis;  // W B
-    Eigen::MatrixXd gram;            // B^T W^T W B
     Eigen::VectorXd log_sd;          // ln sd + 1/2 ln 2 pi of each reading
     Eigen::VectorXd log_pivots;      // ln (W^-1)_kk
-    double log_normaliser = 0;       // - sum of both
     Eigen::VectorXd residual;        // W r, r the residual of the measured readings at m = 0
-    Eigen::VectorXd projection;      // (W B)^T W r
-    double square = 0;               // |W r|^2
+    Sums stated;                     // with the stated errors
 
     void Sum();  // what is summed over readings, from what there is for each
   };
@@ -93,7 +98,7 @@ class EmulatedLikelihood {
   Eigen::VectorXd scatter_variance_;    // share * scatter_sd^2
   Eigen::MatrixXd correlation_factor_;  // lower Cholesky factor of C
   std::vector<Form> forms_;
-  int groups_ = 0;
+  bool model_error_ = false;
 };
 
 }  // namespace calib::inference

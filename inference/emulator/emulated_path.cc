@@ -41,7 +41,7 @@ struct Cloud {
     samples.row(i) = from.samples.row(j);
     at.prediction.mean.row(i) = from.at.prediction.mean.row(j);
     at.prediction.sd.row(i) = from.at.prediction.sd.row(j);
-    at.factors.row(i) = from.at.factors.row(j);
+    at.noise.row(i) = from.at.noise.row(j);
     at.unknown[i] = from.at.unknown[j];
     log_prior[i] = from.log_prior[j];
     before[i] = from.before[j];
@@ -54,7 +54,7 @@ struct Cloud {
     keep(samples);
     keep(at.prediction.mean);
     keep(at.prediction.sd);
-    keep(at.factors);
+    keep(at.noise);
     for (Eigen::VectorXd* values : {&at.unknown, &log_prior, &before, &next}) {
       values->conservativeResize(rows);
     }
@@ -73,7 +73,7 @@ class PathSampler {
 
   void Advance(const Bridge& bridge) {
     cloud_.before = cloud_.next;
-    cloud_.next = bridge.next.LogLikelihood(cloud_.at.prediction, cloud_.at.factors);
+    cloud_.next = bridge.next.LogLikelihood(cloud_.at.prediction, cloud_.at.noise);
     const Eigen::VectorXd weighed = cloud_.log_weights + (cloud_.next - cloud_.before);
     if (2 * EffectiveSampleSize(NormalizedLogWeights(weighed)) >=
         static_cast<double>(cloud_.size())) {
@@ -180,8 +180,8 @@ class PathSampler {
     }
     ++move_;
     Cloud proposed = Place(proposals);
-    proposed.before = bridge.before.LogLikelihood(proposed.at.prediction, proposed.at.factors);
-    proposed.next = bridge.next.LogLikelihood(proposed.at.prediction, proposed.at.factors);
+    proposed.before = bridge.before.LogLikelihood(proposed.at.prediction, proposed.at.noise);
+    proposed.next = bridge.next.LogLikelihood(proposed.at.prediction, proposed.at.noise);
     const auto density = [exponent](const Cloud& cloud, Index i) {
       return cloud.log_prior[i] + (1 - exponent) * cloud.before[i] + exponent * cloud.next[i];
     };

@@ -208,6 +208,44 @@ void StateErrors(const TrainedEmulator& trained, const Eigen::VectorXd& variance
   result.local = trained.local;
 }
 
+// What the draws say of the noise.
+void AddNoise(const DataSet& data, const EmulatedTarget& target, const Eigen::MatrixXd& noise,
+              const Eigen::VectorXd& log_weights, EmulatedResult& result) {
+  for (std::size_t e = 0; e < target.cells().size(); ++e) {
+    const ErrorCells& cells = target.cells()[e];
+    Eigen::VectorXd probability = Eigen::VectorXd::Zero(cells.levels());
+    for (const double level : noise.col(static_cast<Index>(e))) {
+      probability[static_cast<Index>(level)] += 1 / static_cast<double>(noise.rows());
+    }
+    result.model_errors.push_back(SummarizeModelError(data.model_errors[e], cells, probability));
+  }
+  if (!target.cells().empty() || noise.cols() == 0) return;
+  result.variance_factors.resize(noise.cols());
+  result.noise_scale.resize(noise.cols(), 3);
+  for (Index g = 0; g < noise.cols(); ++g) {
+    result.variance_factors[g] = WeightedQuantile(log_weights, noise.col(g), 0.5);
+    for (Index k = 0; k < 3; ++k) {
+      constexpr double kQuantiles[] = {0.05, 0.5, 0.95};
+      result.noise_scale(g, k) =
+          std::sqrt(WeightedQuantile(log_weights, noise.col(g), kQuantiles[k]));
+    }
+  }
+}
+
+// What multiplies the stated variances over the posterior: median factors, or the mean over levels.
+Eigen::VectorXd TypicalVariances(const EmulatedTarget& target, const Eigen::MatrixXd& noise,
+                                 const EmulatedResult& result) {
+  if (target.cells().empty()) return target.LargerVariances(result.variance_factors.transpose());
+  constexpr Index kDraws = 200;  // chosen: a mean variance to a tenth of its spread
+  const Index stride = std::max<Index>(1, noise.rows() / kDraws);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(target.LargerVariances({}).size());
+  Index draws = 0;
+  for (Index i = 0; i < noise.rows(); i += stride, ++draws) {
+    sum += target.LargerVariances(noise.row(i));
+  }
+  return sum / static_cast<double>(draws);
+}
+
 // A path that cannot be had leaves the posterior as it is.
 absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& likelihood,
                       const DataSet& data, const StateEmulator& emulator,
@@ -224,8 +262,10 @@ absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& li
   const DataSet reversed = Reversed(data);
   ASSIGN_OR_RETURN(
       const auto of_reversed,
-      EmulatedLikelihood::Create(
-          reversed, emulator, {.scatter_share = options.training.scatter_share, .reversed = true}));
+      EmulatedLikelihood::Create(reversed, emulator,
+                                 {.scatter_share = options.training.scatter_share,
+                                  .model_error = options.noise == NoiseMode::kModelError,
+                                  .reversed = true}));
   ASSIGN_OR_RETURN(result.reversed_path, EmulatedPath(target, of_reversed, reversed, path, stop));
   return absl::OkStatus();
 }
@@ -326,9 +366,11 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   ASSIGN_OR_RETURN(const auto trained,
                    TrainWithStopped(runs.finished, runs.stopped, data, options.training,
                                     {.max_unknown = options.max_error, .seed = options.seed}));
-  ASSIGN_OR_RETURN(const auto likelihood,
-                   EmulatedLikelihood::Create(data, trained.emulator,
-                                              {.scatter_share = options.training.scatter_share}));
+  ASSIGN_OR_RETURN(
+      const auto likelihood,
+      EmulatedLikelihood::Create(data, trained.emulator,
+                                 {.scatter_share = options.training.scatter_share,
+                                  .model_error = options.noise == NoiseMode::kModelError}));
 
   const auto d = static_cast<Index>(priors.size());
   int known = 0;  // points sampled where the emulator knows the model's history
@@ -342,7 +384,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       target.prior(), sampler,
       [&](const Eigen::MatrixXd& points) {
         const EmulatedPoints at = target.At(points);
-        Eigen::VectorXd values = likelihood.LogLikelihood(at.prediction, at.factors);
+        Eigen::VectorXd values = likelihood.LogLikelihood(at.prediction, at.noise);
         for (Index i = 0; i < values.size(); ++i) {
           if (target.IsKnown(at.unknown[i])) {
             ++known;
@@ -364,8 +406,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
   ScorePrediction prediction = target.Predict(result.draws);
-  const Eigen::MatrixXd factors = target.Factors(state->samples);
-  const double unknown = target.Unknown(prediction.sd, factors).sum();
+  const Eigen::MatrixXd noise = target.Noise(state->samples);
+  const double unknown = target.Unknown(prediction.sd, noise).sum();
   if (options.noise == NoiseMode::kGiven) {
     result.predictive_p = PredictiveP(likelihood, prediction, data.readings.size(), options.known);
     result.stage_p = StageP(likelihood, prediction, options.stages);
@@ -390,23 +432,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   }
   result.correlation = CorrelationOf(
       WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
-  Eigen::VectorXd variance = Eigen::VectorXd::Ones(static_cast<Index>(data.readings.size()));
-  if (options.noise == NoiseMode::kInferred) {
-    result.variance_factors.resize(factors.cols());
-    result.noise_scale.resize(factors.cols(), 3);
-    for (Index g = 0; g < factors.cols(); ++g) {
-      result.variance_factors[g] = WeightedQuantile(log_weights, factors.col(g), 0.5);
-      for (Index k = 0; k < 3; ++k) {
-        constexpr double kQuantiles[] = {0.05, 0.5, 0.95};
-        result.noise_scale(g, k) =
-            std::sqrt(WeightedQuantile(log_weights, factors.col(g), kQuantiles[k]));
-      }
-    }
-    for (std::size_t k = 0; k < target.group().size(); ++k) {
-      variance[static_cast<Index>(k)] = result.variance_factors[target.group()[k]];
-    }
-  }
-  StateErrors(trained, variance, result);
+  AddNoise(data, target, noise, log_weights, result);
+  StateErrors(trained, TypicalVariances(target, noise, result), result);
   result.emulator_sd =
       std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size())));
   result.misfit = MisfitOf(trained.emulator, prediction);

@@ -31,7 +31,7 @@ struct JudgedReadings {
 
 /// Options of EmulatedPosterior.
 struct EmulatorOptions {
-  /// kGiven or kInferred. kEssTarget is a tempering chosen from the weights of the runs themselves,
+  /// All but kEssTarget, which is a tempering chosen from the weights of the runs themselves,
   /// there is nothing in it to emulate: INVALID_ARGUMENT.
   NoiseMode noise = NoiseMode::kGiven;
   TrainingOptions training = {};
@@ -77,6 +77,8 @@ struct EmulatedResult {
   Eigen::VectorXd variance_factors;
   /// kInferred alone: posterior quantiles (5, 50, 95 %) of sqrt(f) of each noise group, groups x 3.
   Eigen::MatrixXd noise_scale;
+  /// kModelError alone: what the model is off by, for each of the data's model errors.
+  std::vector<ModelErrorSummary> model_errors;
 
   /// History of the model over the posterior, T entries, in units of the readings: mean and
   /// quantiles over parameters and over what the emulator does not know of the mean history.
@@ -85,7 +87,7 @@ struct EmulatedResult {
   Eigen::VectorXd predictive_q025, predictive_q25, predictive_q75, predictive_q975;
 
   /// Root mean square error of a run predicted from the others, over the relevant runs and all
-  /// readings, in units of the noise sd (of the inferred one with kInferred).
+  /// readings, in units of the noise sd (of the inferred one with kInferred and kModelError).
   double cross_validated_error = 0;
   /// T: root mean square error of each reading of a run predicted from the others, in units of its
   /// noise sd.

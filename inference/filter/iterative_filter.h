@@ -144,6 +144,8 @@ struct Posterior {
   /// kInferred alone: posterior quantiles (5, 50, 95 %) of sqrt(f) of each noise group
   /// (NoiseGroupsOf), groups x 3: by how much the errors are larger than stated.
   Eigen::MatrixXd noise_scale;
+  /// kModelError alone: what the model is off by, for each of the data's model errors.
+  std::vector<ModelErrorSummary> model_errors;
   /// Proposal::frozen of the last iteration: the posterior is that of the others given these
   /// values.
   std::vector<std::optional<double>> frozen;

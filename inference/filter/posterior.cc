@@ -95,6 +95,21 @@ void MarkFrozen(const Ensemble& ensemble, Posterior& posterior) {
   }
 }
 
+// Posterior::model_errors of all iterations together.
+absl::StatusOr<std::vector<ModelErrorSummary>> ModelErrorsOf(const DataSet& data,
+                                                             const FilterOptions& options,
+                                                             const Ensemble& ensemble,
+                                                             const Eigen::VectorXd& log_weights) {
+  ASSIGN_OR_RETURN(const auto likelihood, LikelihoodOf(ensemble, data, options));
+  Eigen::MatrixXd predictions(log_weights.size(), likelihood.readings());
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : ensemble.used) {
+    predictions.middleRows(row, iteration.predictions.rows()) = iteration.predictions;
+    row += iteration.predictions.rows();
+  }
+  return ModelErrorsOver(likelihood, data, predictions, log_weights);
+}
+
 std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& ensemble,
                                   const Posterior& posterior) {
   std::vector<std::string> warnings;
@@ -248,6 +263,9 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
   }
   if (options.noise == NoiseMode::kInferred) {
     ASSIGN_OR_RETURN(posterior.noise_scale, NoiseScaleOf(data, options, ensemble, log_weights));
+  }
+  if (options.noise == NoiseMode::kModelError) {
+    ASSIGN_OR_RETURN(posterior.model_errors, ModelErrorsOf(data, options, ensemble, log_weights));
   }
   if (options.noise == NoiseMode::kGiven) {
     posterior.predictive_p = PredictiveP(data, ensemble.log_likelihood, log_weights, known);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "inference/numerics/log_weights.h"
 #include "inference/numerics/special_functions.h"
 #include "inference/sampling/halton.h"
 
@@ -38,6 +39,28 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
         draws[kDrawsOfFactor - 1 - kDrawsOfFactor / 20];
   }
   return scale;
+}
+
+std::vector<ModelErrorSummary> ModelErrorsOver(const GaussianLikelihood& likelihood,
+                                               const DataSet& data,
+                                               const Eigen::MatrixXd& predictions,
+                                               const Eigen::VectorXd& log_weights) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
+    if (log_weights[i] >= std::log(kNoWeight)) rows.push_back(i);
+  }
+  std::vector<ModelErrorSummary> summaries;
+  for (const auto& levels : likelihood.ModelErrors(predictions(rows, Eigen::all))) {
+    Eigen::VectorXd probability = Eigen::VectorXd::Zero(levels.log_joint.cols());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Eigen::VectorXd of_sample =
+          NormalizedLogWeights(levels.log_joint.row(static_cast<Eigen::Index>(i)));
+      probability += std::exp(log_weights[rows[i]]) * of_sample.array().exp().matrix();
+    }
+    summaries.push_back(SummarizeModelError(data.model_errors[levels.error], levels.cells,
+                                            probability / probability.sum()));
+  }
+  return summaries;
 }
 
 // ln L = const - chi^2 / 2 with stated errors, the constant that of zero residuals.

@@ -19,6 +19,14 @@ namespace calib::inference {
 Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
                            const Eigen::VectorXd& log_weights);
 
+/// Posterior::model_errors: the data's model errors over the posterior, those without readings left
+/// out. likelihood: of the data, with NoiseMode::kModelError; predictions: of the samples, N x T;
+/// samples of next to no weight (1e-12) are passed over.
+std::vector<ModelErrorSummary> ModelErrorsOver(const GaussianLikelihood& likelihood,
+                                               const DataSet& data,
+                                               const Eigen::MatrixXd& predictions,
+                                               const Eigen::VectorXd& log_weights);
+
 /// Posterior::predictive_p of samples with these log likelihoods (N) by stated errors
 /// (NoiseMode::kGiven); NaN for data that have no likelihood. known: how well the errors are known.
 double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,

@@ -120,6 +120,21 @@ std::string PosteriorText(const v1::Posterior& posterior,
                     Number(scale.q05(), 2), Number(scale.q95(), 2)),
         "", "  ");
   }
+  for (const auto& error : posterior.model_error()) {
+    std::vector<std::string> parts;
+    const auto add = [&parts](const v1::Posterior::ModelError::Size& size, double scale,
+                              const char* of) {
+      parts.push_back(fmt::format("{}{} (5-95 %: {} to {})", Number(scale * size.q50(), 2), of,
+                                  Number(scale * size.q05(), 2), Number(scale * size.q95(), 2)));
+    };
+    if (error.has_relative()) add(error.relative(), 100, " % of a reading");
+    if (error.has_absolute()) add(error.absolute(), 1, " in the unit of the readings, SI");
+    text += report::Wrapped(
+        fmt::format("Beside the stated errors the model is off in {} by {}, one "
+                    "standard deviation.",
+                    fmt::join(error.observables(), ", "), fmt::join(parts, " and ")),
+        "", "  ");
+  }
   for (const std::string& warning : warnings) text += report::Wrapped(warning, "! ", "  ");
   return text;
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
@@ -165,6 +166,23 @@ Eigen::VectorXd StatedError(const campaign::MeasuredObservable& observable,
       [&law = *observable.noise](double value) { return campaign::ErrorOf(law, value); });
 }
 
+// Standard deviation of the model error that the calibration inferred for this observable, the
+// relative part of what the runs predict on average.
+Eigen::VectorXd InferredModelError(const report::CampaignView& parent,
+                                   const std::string& observable, const Eigen::VectorXd& mean) {
+  Eigen::VectorXd square = Eigen::VectorXd::Zero(mean.size());
+  for (const v1::Posterior::ModelError& error : parent.posterior.model_error()) {
+    const bool own = std::any_of(
+        error.observables().begin(), error.observables().end(),
+        [&observable](const std::string& name) { return absl::EndsWith(name, "." + observable); });
+    if (!own) continue;
+    square = error.relative().mean_square() * mean.cwiseAbs2() +
+             Eigen::VectorXd::Constant(mean.size(), error.absolute().mean_square());
+    break;
+  }
+  return square.cwiseSqrt();
+}
+
 // What the model is known to miss where it was calibrated.
 struct Misfit {
   const report::CampaignView* parent = nullptr;
@@ -197,6 +215,8 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
       missed = discrepancy.rms;
       quantity = inference::WithModelError(std::move(quantity), missed);
     }
+    const Eigen::VectorXd off = InferredModelError(*misfit.parent, observable.name, quantity.mean);
+    if (off.any()) quantity = inference::WithModelError(std::move(quantity), off);
     PredictedObservable out{.experiment = experiment.name,
                             .observable = observable.name,
                             .control_name = experiment.control_name,
@@ -214,8 +234,9 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
           {.level = level.value,
            .probability = inference::ExceedanceProbability(out.quantity, level.value),
            .parts = inference::PartsOfExceedance(out.quantity, level.value),
-           .anywhere = inference::ExceedanceAnywhere(out.quantity, runs.values, missed, error,
-                                                     level.value)});
+           .anywhere = inference::ExceedanceAnywhere(
+               out.quantity, runs.values, missed, (error.cwiseAbs2() + off.cwiseAbs2()).cwiseSqrt(),
+               level.value)});
     }
     prediction.runs = static_cast<int>(runs.values.rows());
     prediction.failed =

@@ -28,7 +28,7 @@ absl::Status CheckDiagnosable(const report::CampaignView& view) {
   if (view.campaign.filter.noise != inference::NoiseMode::kGiven) {
     return absl::FailedPreconditionError(
         absl::StrCat("campaign ", id,
-                     " states no size of the errors (noise is inferred or "
+                     " states no size of the errors (noise is inferred, beside a model error or "
                      "tempered), so its model cannot be judged; give the noise"));
   }
   const std::size_t readings = campaign::MakeDataSet(view.campaign).readings.size();

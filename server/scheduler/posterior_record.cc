@@ -98,6 +98,30 @@ void AddNoiseScale(const Definition& definition, const Eigen::MatrixXd& scale,
   }
 }
 
+void AddSize(const inference::ErrorScaleSummary& size, v1::Posterior::ModelError::Size& out) {
+  out.set_mean(size.mean);
+  out.set_sd(size.sd);
+  out.set_q05(size.q05);
+  out.set_q50(size.q50);
+  out.set_q95(size.q95);
+  out.set_mean_square(size.mean_square);
+}
+
+void AddModelErrors(const Definition& definition,
+                    const std::vector<inference::ModelErrorSummary>& errors,
+                    v1::Posterior& message) {
+  for (const inference::ModelErrorSummary& error : errors) {
+    v1::Posterior::ModelError& out = *message.add_model_error();
+    for (const auto& [e, j] : error.members) {
+      const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(e)];
+      out.add_observables(absl::StrCat(experiment.name, ".",
+                                       experiment.observables[static_cast<std::size_t>(j)].name));
+    }
+    if (error.relative) AddSize(*error.relative, *out.mutable_relative());
+    if (error.absolute) AddSize(*error.absolute, *out.mutable_absolute());
+  }
+}
+
 // Thinned evenly.
 void AddDraws(const Eigen::MatrixXd& draws, v1::Posterior& message) {
   const Eigen::Index stride = std::max<Eigen::Index>(1, draws.rows() / kDraws);
@@ -240,6 +264,8 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
           *message.mutable_reversed_path());
   AddNoiseScale(definition, emulated ? answer.emulated->noise_scale : posterior.noise_scale,
                 message);
+  AddModelErrors(definition, emulated ? answer.emulated->model_errors : posterior.model_errors,
+                 message);
   const std::optional<double>& predictive_p =
       emulated ? answer.emulated->predictive_p : posterior.predictive_p;
   if (answer.HasIntervals() && predictive_p.has_value()) {

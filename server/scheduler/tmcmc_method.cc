@@ -160,9 +160,14 @@ class TmcmcMethod final : public Method {
     }
     const auto likelihood =
         inference::GaussianLikelihood::Create(definition_.data, definition_.campaign.filter.noise);
-    if (likelihood.ok()) {  // the chains have come this far by it
+    if (!likelihood.ok()) return;  // the chains have come this far by it
+    const Eigen::MatrixXd predictions = PredictionsOf(state, history);
+    if (definition_.campaign.filter.noise == inference::NoiseMode::kModelError) {
+      posterior.model_errors =
+          inference::ModelErrorsOver(*likelihood, definition_.data, predictions, equal);
+    } else {
       posterior.noise_scale =
-          inference::NoiseScale(likelihood->VarianceFactors(PredictionsOf(state, history)), equal);
+          inference::NoiseScale(likelihood->VarianceFactors(predictions), equal);
     }
   }
 

@@ -22,7 +22,7 @@
 #include "server/campaign/file/read_joint_prior.h"
 #include "server/campaign/file/read_materials.h"
 #include "server/campaign/file/read_model.h"
-#include "server/campaign/file/read_noise.h"
+#include "server/campaign/file/read_noise_groups.h"
 #include "server/campaign/file/read_precomputed.h"
 #include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/shared/map_reader.h"

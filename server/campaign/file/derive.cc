@@ -76,6 +76,15 @@ void RaiseSamples(YamlNode& root) {
   if (given < fewest) YamlAt(inference, "samples") = YamlScalar(absl::StrCat(fewest));
 }
 
+// Runs that infer nothing may be of other observables than the groups name.
+void DropNoiseGroups(YamlNode& root) {
+  const YamlNode* noise = YamlFind(root, "noise");
+  if (noise == nullptr || noise->kind != Kind::kMap) return;
+  const bool inferred = YamlFind(*noise, "inferred") != nullptr;
+  if (inferred) YamlAt(root, "noise") = YamlScalar("inferred");
+  if (!inferred && YamlFind(*noise, "model_error") != nullptr) YamlErase(root, "noise");
+}
+
 void ChangeInference(const Derivation& derivation, YamlNode& root) {
   if (derivation.race || (!derivation.rows.empty() && !derivation.method)) {
     YamlNode inference = YamlMap(
@@ -89,6 +98,7 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
     YamlAt(root, "inference") = std::move(inference);
     YamlErase(root, "early_stopping");
     YamlErase(root, "budget");
+    DropNoiseGroups(root);
     return;
   }
   YamlNode& inference = YamlAt(root, "inference");

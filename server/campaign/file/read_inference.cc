@@ -27,14 +27,28 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
       noise->Finish();
       return;
     }
+    if (noise->Has("model_error")) {  // likewise
+      filter.noise = NoiseMode::kModelError;
+      noise->Ignore({"model_error"});
+      noise->Finish();
+      return;
+    }
     noise->Require("ess_target",
-                   "allowed: given, inferred, {inferred: [...]} or {ess_target: 0.2}");
+                   "allowed: given, inferred, {inferred: [...]}, {model_error: [...]} or "
+                   "{ess_target: 0.2}");
     filter.noise = NoiseMode::kEssTarget;
     filter.ess_target = noise->Quantity("ess_target").value_or(filter.ess_target);
     noise->Finish();
     return;
   }
-  filter.noise = map.Choice("noise", kNoiseModeWords).value_or(filter.noise);
+  const NoiseMode mode = map.Choice("noise", kNoiseModeWords).value_or(filter.noise);
+  if (mode == NoiseMode::kModelError) {
+    map.Problem("noise",
+                "names a model error without saying of what; write {model_error: [{observables: "
+                "[NAME], relative: {prior: uniform, min: 0, max: 0.2}}]}");
+    return;
+  }
+  filter.noise = mode;
 }
 
 constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise

@@ -1,6 +1,5 @@
 #pragma once
-// The settings of one compared observable: {noise: {...}, weight: w}; and of all of them: noise:
-// {inferred: [...]}, which share one factor of their noise.
+// The settings of one compared observable: {noise: {...}, weight: w}.
 
 #include "server/campaign/file/laboratory_table.h"
 
@@ -21,11 +20,5 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
                const NoiseRules& rules, const LaboratoryTable* table,
                const std::vector<double>& raw, ReadContext& context,
                MeasuredObservable& observable);
-
-/// Reads the list under noise.inferred once the experiments are known, into campaign.shared_noise.
-/// An entry has `observables` (NAME: of every experiment that calibrates; EXPERIMENT.NAME) and the
-/// prior of their common variance factor, inverse gamma of `shape` and `rate` (1/2 each). Does
-/// nothing for noise of another form.
-void ReadNoiseGroups(MapReader& campaign_map, Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -42,6 +42,8 @@ Section Noise() {
           {
               {"inferred", ListOf(MapOf("noise_group")), "",
                "one factor on the errors of each group; what stands in no group has its own"},
+              {"model_error", ListOf(MapOf("model_error")), "",
+               "what the model is off by, inferred beside the stated errors [Hadjidoukas 2014]"},
               {"ess_target", Number("1", kFraction), "",
                "errors scale with the reading until this share of the samples is effective "
                "[Cheng 2019]"},
@@ -58,6 +60,20 @@ Section NoiseGroup() {
               {"shape", Number("1", kPositive), "0.5",
                "a of the factor's prior, f^(-a-1) exp(-b/f) [Hadjidoukas 2014]"},
               {"rate", Number("1", kPositive), "0.5", "b of it"},
+          }};
+}
+
+Section ModelErrorKeys() {
+  return {"model_error",
+          "noise.model_error[]",
+          {
+              {"observables", OneOrMore(Text()), kRequired,
+               "what the model is off in by the same: NAME of every fitted experiment, or "
+               "EXPERIMENT.NAME"},
+              {"relative", MapOf("error_scale"), "none",
+               "standard deviation over the size of a reading"},
+              {"absolute", MapOf("error_scale"), "none",
+               "standard deviation in the unit of the readings"},
           }};
 }
 
@@ -110,7 +126,7 @@ Section LineageKeys() {
 }  // namespace
 
 std::vector<Section> SectionsOfCampaign() {
-  return {File(),        Noise(),      NoiseGroup(), EarlyStoppingKeys(),
+  return {File(),        Noise(),      NoiseGroup(), ModelErrorKeys(), EarlyStoppingKeys(),
           FailureKeys(), BudgetKeys(), LineageKeys()};
 }
 

@@ -157,6 +157,14 @@ Section ParameterKeys() {
   return {"parameter", "parameters.NAME", std::move(keys)};
 }
 
+Section ErrorScaleKeys() {
+  std::vector<Key> keys = KeysOfPrior();
+  std::erase_if(keys, [](const Key& key) { return key.name == "unit"; });
+  keys.push_back({"on", OneWord(kErrorScaleWords), "sd",
+                  "what the numbers are of: the standard deviation, or its square"});
+  return {"error_scale", "noise.model_error[].relative, absolute", std::move(keys)};
+}
+
 Section Tie() {
   return {"tie",
           "parameters.NAME, tied",
@@ -256,11 +264,25 @@ Section ProgramNumber() {
 }  // namespace
 
 std::vector<Section> SectionsOfModel() {
-  return {Model(),         Fixed(),         Parameters(),       PriorKeys(),
-          ParameterKeys(), Tie(),           Materials(),        Material(),
-          Pairs(),         Pair(),          PrecomputedKeys(),  HeldEffects(),
-          HeldEffect(),    ProgramStates(), ProgramLimitKeys(), ProgramNumericsKeys(),
-          ProgramNumber(), ProgramNext()};
+  return {Model(),
+          Fixed(),
+          Parameters(),
+          PriorKeys(),
+          ParameterKeys(),
+          Tie(),
+          ErrorScaleKeys(),
+          Materials(),
+          Material(),
+          Pairs(),
+          Pair(),
+          PrecomputedKeys(),
+          HeldEffects(),
+          HeldEffect(),
+          ProgramStates(),
+          ProgramLimitKeys(),
+          ProgramNumericsKeys(),
+          ProgramNumber(),
+          ProgramNext()};
 }
 
 }  // namespace calib::campaign

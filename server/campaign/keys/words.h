@@ -28,6 +28,13 @@ inline constexpr std::array kPriorWords = {
     Word{inference::PriorKind::kLogNormal, "log_normal"},
 };
 
+/// What the prior of an error's size is of.
+enum class ErrorScaleOf { kSd, kVariance };
+inline constexpr std::array kErrorScaleWords = {
+    Word{ErrorScaleOf::kSd, "sd"},
+    Word{ErrorScaleOf::kVariance, "variance"},
+};
+
 /// How the laboratory computed its strains.
 enum class Strain { kEngineering, kLogarithmic };
 inline constexpr std::array kStrainWords = {

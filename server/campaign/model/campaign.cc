@@ -147,6 +147,7 @@ inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
   for (const SharedNoise& shared : campaign.shared_noise) {
     data.noise_groups.push_back({.members = shared.members, .prior = shared.prior});
   }
+  if (role == Role::kCalibrate) data.model_errors = campaign.model_errors;
   return data;
 }
 

@@ -189,6 +189,7 @@ inline constexpr std::array kNoiseModeWords = {
     Word{inference::NoiseMode::kGiven, "given"},
     Word{inference::NoiseMode::kInferred, "inferred"},
     Word{inference::NoiseMode::kEssTarget, "ess_target"},
+    Word{inference::NoiseMode::kModelError, "model_error"},
 };
 
 /// Observables that share one inferred factor of their noise.
@@ -261,6 +262,7 @@ struct Campaign {
   std::optional<Lineage> lineage;
   std::map<int, Freeze> freeze;  ///< by iteration, from 1
   std::vector<SharedNoise> shared_noise;
+  std::vector<inference::ModelError> model_errors{};
   inference::FilterOptions filter;
   SurrogateModel surrogate = SurrogateModel::kCubicRbf;
   /// With surrogate_msrs a run ends when its misfit so far exceeds this times the best run's (a

@@ -186,6 +186,21 @@ Json PosteriorFields(const v1::Posterior& p,
                            {"q50", scale.q50()},
                            {"q95", scale.q95()}});
   }
+  Json model_error = Json::array();
+  const auto size_of = [](const v1::Posterior::ModelError::Size& size) {
+    return Json{{"mean", size.mean()},
+                {"sd", size.sd()},
+                {"q05", size.q05()},
+                {"q50", size.q50()},
+                {"q95", size.q95()}};
+  };
+  for (const auto& error : p.model_error()) {
+    Json entry{{"observables",
+                std::vector<std::string>(error.observables().begin(), error.observables().end())}};
+    if (error.has_relative()) entry["relative"] = size_of(error.relative());
+    if (error.has_absolute()) entry["absolute"] = size_of(error.absolute());
+    model_error.push_back(std::move(entry));
+  }
   Json correlation = Json::array();
   const int d = p.parameters_size();
   for (int i = 0; i < d && p.correlation_size() == d * d; ++i) {
@@ -212,6 +227,7 @@ Json PosteriorFields(const v1::Posterior& p,
           {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
           {"noise", p.noise()},
           {"noise_scale", noise_scale},
+          {"model_error", model_error},
           {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
           {"path", Path(p.path(), order)},
           {"reversed_path", Path(p.reversed_path(), order)},

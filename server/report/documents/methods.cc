@@ -110,6 +110,9 @@ std::string ErrorSentence(const campaign::Campaign& campaign) {
     case inference::NoiseMode::kInferred:
       return "The variance of the errors was inferred, one factor per observable, and "
              "marginalised.";
+    case inference::NoiseMode::kModelError:
+      return "Errors of readings are normal with the standard deviations stated; an error of the "
+             "model beside them was inferred and marginalised.";
     case inference::NoiseMode::kEssTarget:
       break;
   }

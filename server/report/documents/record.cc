@@ -26,6 +26,8 @@ std::string NoiseInWords(const campaign::Campaign& campaign) {
       return "given: the standard deviations stated in the campaign file";
     case inference::NoiseMode::kInferred:
       return "inferred: one variance factor per observable, marginalised";
+    case inference::NoiseMode::kModelError:
+      return "given, and an inferred error of the model beside it, marginalised";
     case inference::NoiseMode::kEssTarget:
       break;
   }

@@ -285,7 +285,12 @@ INSTANTIATE_TEST_SUITE_P(
                 "allowed: between 0.2 "
                 "(excluded) and 0.6 (excluded)"},
         Mistake{"NoSuchNoiseMode", "noise: given", "noise: guessed",
-                "c.yaml:35: noise: 'guessed' is unknown; allowed: given, inferred, ess_target"},
+                "c.yaml:35: noise: 'guessed' is unknown; allowed: given, inferred, ess_target, "
+                "model_error"},
+        Mistake{"AModelErrorOfNothing", "noise: given", "noise: model_error",
+                "c.yaml:35: noise: names a model error without saying of what; write "
+                "{model_error: [{observables: [NAME], relative: {prior: uniform, min: 0, max: "
+                "0.2}}]}"},
         Mistake{"FewChains", "method: iterative_bayesian_filter, samples: 20",
                 "method: tmcmc, samples: 10",
                 "c.yaml:36: inference.samples: '10' is not a whole number from 20 to 1000000"},

@@ -18,6 +18,7 @@ using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 using testing::GoodFiles;
 using testing::GoodYaml;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::ProblemsOf;
 using testing::ReaderOf;
@@ -427,6 +428,50 @@ TEST(CampaignFile, ReadsGroupsOfNoise) {
   ASSERT_THAT(data.noise_groups, SizeIs(1));
   EXPECT_THAT(data.noise_groups[0].members, ElementsAre(std::pair(0, 0), std::pair(0, 1)));
   EXPECT_EQ(data.noise_groups[0].prior.shape, 3);
+}
+
+TEST(CampaignFile, ReadsModelErrors) {
+  const Campaign c =
+      Read(Spoiled("noise: given",
+                   "noise:\n  model_error:\n"
+                   "    - {observables: [stress_ratio], relative: {prior: uniform, min: 0, max: 20 "
+                   "percent}}\n"
+                   "    - observables: volumetric_strain\n"
+                   "      relative: {on: variance, prior: uniform, min: 0, max: 0.01}\n"
+                   "      absolute: {prior: normal, mean: 0, sd: 0.1 percent, min: 0}"))
+          .campaign;
+  EXPECT_EQ(c.filter.noise, inference::NoiseMode::kModelError);
+  const inference::DataSet data = MakeDataSet(c);
+  ASSERT_THAT(data.model_errors, SizeIs(2));
+  EXPECT_THAT(data.model_errors[0].members, ElementsAre(std::pair(0, 0)));
+  EXPECT_EQ(data.model_errors[0].relative->prior.max, 0.2);
+  EXPECT_FALSE(data.model_errors[0].relative->on_variance);
+  EXPECT_FALSE(data.model_errors[0].absolute.has_value());
+  EXPECT_TRUE(data.model_errors[1].relative->on_variance);
+  EXPECT_EQ(data.model_errors[1].absolute->prior.sd, 0.001);
+  EXPECT_THAT(MakeDataSet(c, Role::kValidate).model_errors, IsEmpty());
+}
+
+TEST(CampaignFile, BadModelErrorsAreTold) {
+  const auto problem = [](const std::string& entries) {
+    return ProblemsOf(Spoiled("noise: given", "noise: {model_error: " + entries + "}"));
+  };
+  EXPECT_THAT(problem("[{observables: [stress_ratio]}]"), HasSubstr("needs relative, absolute or"));
+  EXPECT_THAT(problem("[{observables: [porosity], relative: {prior: uniform, min: 0, max: 1}}]"),
+              HasSubstr("'porosity' is not fitted in any experiment"));
+  EXPECT_THAT(
+      problem("[{observables: [stress_ratio], relative: {prior: uniform, min: -1, max: 1}}]"),
+      HasSubstr("has to be 0 or more: this is the size of an error"));
+  EXPECT_THAT(problem("[{observables: [stress_ratio], relative: {prior: normal, mean: 0, sd: 1}}]"),
+              HasSubstr("has to be 0 or more"));
+  EXPECT_THAT(problem("[{observables: [stress_ratio], relative: {prior: uniform, min: 0, max: 1}}, "
+                      "{observables: stress_ratio, relative: {prior: uniform, min: 0, max: 1}}]"),
+              HasSubstr("stands in two groups; its errors have one model error"));
+  EXPECT_THAT(
+      problem("[{observables: [stress_ratio], relative: {on: range, prior: uniform, min: 0, "
+              "max: 1}}]"),
+      HasSubstr("sd, variance"));
+  EXPECT_THAT(problem("[]"), HasSubstr("has to be a list of groups"));
 }
 
 TEST(CampaignFile, ReadsWhatIsHeldWhen) {

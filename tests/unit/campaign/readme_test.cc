@@ -31,7 +31,7 @@ TEST(CampaignReadme, EveryExampleIsAGoodCampaign) {
       "# == TESTS ==\ntest_id,kind\nT1,drained\n# == DATA ==\n"
       "test_id,eps_a[%],eps_v[%],s3[kPa],s1[kPa]\nT1,0,0,50,50\nT1,0.1,,50,66\nT2,0,0,100,100\n";
   const auto blocks = YamlBlocks(CALIB_CAMPAIGN_FILE_REFERENCE);
-  EXPECT_EQ(blocks.size(), 7U);
+  EXPECT_EQ(blocks.size(), 8U);
   for (std::string block : blocks) {
     if (block.rfind("name:", 0) != 0) {  // a part, to be joined to the whole file
       std::string whole = blocks.front();

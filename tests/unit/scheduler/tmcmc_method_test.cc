@@ -124,9 +124,11 @@ TEST_F(FinishedTmcmcCampaign, HasRunHeldOutTestsOnSomeOfTheChains) {
 }
 
 // Of the same data: the weighted posterior of many samples drawn from the prior, with the noise
-// given and inferred.
+// given, inferred and with a model error.
 TEST(TmcmcCampaign, AgreesWithManyWeightedSamples) {
-  for (const std::string noise : {"given", "inferred"}) {
+  const std::string model_error =
+      "{model_error: [{observables: [stress_ratio], relative: {prior: uniform, min: 0, max: 1}}]}";
+  for (const std::string& noise : {std::string("given"), std::string("inferred"), model_error}) {
     const auto submit = [&noise](SimulatedService& service, testing::SmallCampaign campaign) {
       const std::string given = "noise: given";
       campaign.yaml.replace(campaign.yaml.find(given), given.size(), "noise: " + noise);
@@ -168,6 +170,16 @@ TEST(TmcmcCampaign, AgreesWithManyWeightedSamples) {
       EXPECT_NEAR(own.q05(), other.q05(), error * range);
       EXPECT_NEAR(own.q50(), other.q50(), error * range);
       EXPECT_NEAR(own.q95(), other.q95(), error * range);
+    }
+    ASSERT_EQ(found.model_error_size(), noise == model_error ? 1 : 0);
+    ASSERT_EQ(expected.model_error_size(), found.model_error_size());
+    for (int g = 0; g < found.model_error_size(); ++g) {
+      const auto& own = found.model_error(g).relative();
+      const auto& other = expected.model_error(g).relative();
+      EXPECT_EQ(found.model_error(g).observables(0), "tx.stress_ratio");
+      EXPECT_FALSE(found.model_error(g).has_absolute());
+      EXPECT_NEAR(own.mean(), other.mean(), error * other.sd());
+      EXPECT_NEAR(own.q95(), other.q95(), error * (other.q95() - other.q05()));
     }
   }
 }

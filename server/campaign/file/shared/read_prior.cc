@@ -108,6 +108,16 @@ std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
   return prior;
 }
 
+std::string SquareOf(const std::string& unit) {
+  const auto parsed = ParseUnit(unit);
+  if (!parsed.ok()) return "1";
+  const Dimension& one = parsed->dimension;
+  return SiName({.kilogram = 2 * one.kilogram,
+                 .metre = 2 * one.metre,
+                 .second = 2 * one.second,
+                 .radian = 2 * one.radian});
+}
+
 // The SI unit that the numbers of a free prior carry; the first that has one decides.
 std::string UnitOfNumbers(MapReader& map) {
   if (const auto unit = map.Text("unit")) {
@@ -167,6 +177,22 @@ std::optional<Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
   if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
   nuisance = map.TrueOrFalse("nuisance").value_or(false);
   return ReadFrom(map, si_unit);
+}
+
+std::optional<inference::ErrorScale> ReadErrorScale(const YamlNode& node, const std::string& path,
+                                                    const std::string& si_unit,
+                                                    ProblemList& problems) {
+  MapReader map(node, path, SectionOf("error_scale"), problems);
+  if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
+  const bool on_variance =
+      map.Choice("on", kErrorScaleWords).value_or(ErrorScaleOf::kSd) == ErrorScaleOf::kVariance;
+  const auto prior = ReadFrom(map, on_variance ? SquareOf(si_unit) : si_unit);
+  if (!prior) return std::nullopt;
+  if (!(prior->min >= 0)) {
+    map.Problem("min", "has to be 0 or more: this is the size of an error");
+    return std::nullopt;
+  }
+  return inference::ErrorScale{.prior = *prior, .on_variance = on_variance};
 }
 
 std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,

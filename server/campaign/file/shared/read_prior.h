@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "inference/data/model_error.h"
 #include "inference/prior/prior.h"
 #include "server/campaign/file/shared/map_reader.h"
 
@@ -33,6 +34,12 @@ bool IsTied(const YamlNode& node);
 std::optional<inference::Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
                                             const std::string& si_unit, ProblemList& problems,
                                             bool& nuisance);
+
+/// The prior of a standard deviation in si_unit, or with `on: variance` of its square, at 0 or
+/// above.
+std::optional<inference::ErrorScale> ReadErrorScale(const YamlNode& node, const std::string& path,
+                                                    const std::string& si_unit,
+                                                    ProblemList& problems);
 
 /// ReadPriorOf() for a parameter that no catalogue knows (precomputed runs): its unit is what its
 /// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).

@@ -84,6 +84,8 @@ export interface PathPoint {
   ess: Maybe;
 }
 
+export interface ErrorSize { mean: Maybe; sd: Maybe; q05: Maybe; q50: Maybe; q95: Maybe }
+
 export interface Posterior {
   campaign: string;
   iteration: number | null;
@@ -97,6 +99,7 @@ export interface Posterior {
   ess: Maybe;
   posterior_from: string | null;
   predictive_p: Maybe;
+  model_error?: { observables: string[]; relative?: ErrorSize; absolute?: ErrorSize }[];
   noise_scale?: { observables: string[]; q05: Maybe; q50: Maybe; q95: Maybe }[];
   path: PathPoint[];
   draws?: { parameters: string[]; values: number[][] } | null;

@@ -2,7 +2,7 @@
 
 import { h, replace, value } from "../dom.ts";
 import type { Answer } from "../answers.ts";
-import type { Lineage, Posterior } from "../documents.ts";
+import type { ErrorSize, Lineage, Posterior } from "../documents.ts";
 import { cornerFigure, inferredParameters, pathFigure, type NamedPosterior } from "../figures/parameters.ts";
 import { chanceText, nameForPeople, numberText, quantityText, unitForPeople } from "../units.ts";
 import { absent, empty, FigureList, keeper, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
@@ -65,6 +65,11 @@ export const parametersView: View = (root, context) => {
       posterior.predictive_p === null ? null : [" Data like these or further off under the model: ", value(posterior.predictive_p, chanceText(posterior.predictive_p)), "."]),
       (posterior.noise_scale ?? []).map(({ observables, q05, q50, q95 }) => h("p", {}, `Errors of ${observables.map(nameForPeople).join(", ")} are `,
         value(q50, numberText(q50, 2)), ` times as large as stated (5 to 95 %: ${numberText(q05, 2)} to ${numberText(q95, 2)}).`)),
+      (posterior.model_error ?? []).map(({ observables, relative, absolute }) => h("p", {},
+        `Beside the stated errors the model is off in ${observables.map(nameForPeople).join(", ")} by `,
+        relative === undefined ? null : errorSize(relative, 100, " % of a reading"),
+        relative === undefined || absolute === undefined ? null : " and ",
+        absolute === undefined ? null : errorSize(absolute, 1, " in the unit of the readings, SI"), ".")),
       warnings(posterior.warnings), parameterTable(posterior.parameters),
       Object.keys(posterior.nuisance_parameters ?? {}).length === 0 ? null : parameterTable(posterior.nuisance_parameters!, "nuisance"));
     const laid: NamedPosterior[] = [{ name: nameIn(lineage, id), posterior }];
@@ -78,6 +83,11 @@ export const parametersView: View = (root, context) => {
     paths.update(posterior.path.length === 0 ? [] : names.map((name) => pathFigure(posterior, name)));
   });
 };
+
+function errorSize({ q05, q50, q95 }: ErrorSize, scale: number, of: string): (Node | string)[] {
+  const shown = (x: number | null): string => numberText(x === null ? null : scale * x, 2);
+  return [value(q50, shown(q50)), `${of} (5 to 95 %: ${shown(q05)} to ${shown(q95)})`];
+}
 
 function nameIn(lineage: Answer<unknown> | undefined, id: string): string {
   const node = valueOf<Lineage>(lineage)?.nodes.find(({ campaign }) => campaign === id);
