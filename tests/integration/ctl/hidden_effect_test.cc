@@ -11,9 +11,9 @@
 namespace calib::ctl {
 namespace {
 
-class HiddenEffect : public CalibctlFixture {
+class HiddenEffectSlow : public CalibctlFixture {
  protected:
-  HiddenEffect() {
+  HiddenEffectSlow() {
     for (const char* file : {"campaign.yaml", "tx100.csv", "tx200.csv", "tx400.csv"}) {
       std::filesystem::copy_file(std::filesystem::path(CALIB_HIDDEN_EFFECT) / file, work_ / file);
     }
@@ -38,7 +38,7 @@ std::vector<std::string> Split(const std::string& line) {
 }
 
 // The shipped example. What was hidden: make_measurements beside it.
-TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
+TEST_F(HiddenEffectSlow, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
   const Answer run = Call("run campaign.yaml --state s --workers 2 --json");
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(run.json()["posterior_from"], "none") << "no run is where an emulator would put it";
@@ -87,7 +87,6 @@ TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
 // A measurement of the model itself on another packing of another number of grains. Eight packings:
 // four know their scatter to 40 % only, and controls fail with them
 // (deploy/bench/hidden-effects.d).
-using HiddenEffectSlow = HiddenEffect;
 TEST_F(HiddenEffectSlow, IsNotFoundWhereNothingIsHidden) {
   const std::string campaign = Read("campaign.yaml");
   Write("other.yaml",
