@@ -5,6 +5,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/keys/sections.h"
 #include "server/campaign/keys/words.h"
+#include "server/campaign/model/population.h"
 #include "server/campaign/model/words.h"
 
 namespace calib::campaign {
@@ -154,7 +155,22 @@ Section ParameterKeys() {
   std::vector<Key> keys = KeysOfPrior();
   keys.push_back({"nuisance", TrueOrFalse(), "false",
                   "it is inferred, and not reported among what is wanted"});
+  keys.push_back({"per", OneWord(kPerWords), "one value",
+                  "it has a value for each experiment, or for each `batch`"});
+  keys.push_back({"spread", MapOf("spread"), "required with `per`",
+                  "prior of the sd of these values around the common one"});
+  keys.push_back({"labels", OneOrMore(Text()), "of all experiments",
+                  "with `per`: what has a value of its own; others have the common one"});
   return {"parameter", "parameters.NAME", std::move(keys)};
+}
+
+Section Spread() {
+  return {"spread",
+          "parameters.NAME.spread",
+          {{"prior", OneWord({"half_normal"}), kRequired, "the family"},
+           {"sd", NumberOfCatalogue(), kRequired,
+            "standard deviation of the normal of which this is the half, in the parameter's "
+            "unit"}}};
 }
 
 Section Tie() {
@@ -256,11 +272,25 @@ Section ProgramNumber() {
 }  // namespace
 
 std::vector<Section> SectionsOfModel() {
-  return {Model(),         Fixed(),         Parameters(),       PriorKeys(),
-          ParameterKeys(), Tie(),           Materials(),        Material(),
-          Pairs(),         Pair(),          PrecomputedKeys(),  HeldEffects(),
-          HeldEffect(),    ProgramStates(), ProgramLimitKeys(), ProgramNumericsKeys(),
-          ProgramNumber(), ProgramNext()};
+  return {Model(),
+          Fixed(),
+          Parameters(),
+          PriorKeys(),
+          ParameterKeys(),
+          Spread(),
+          Tie(),
+          Materials(),
+          Material(),
+          Pairs(),
+          Pair(),
+          PrecomputedKeys(),
+          HeldEffects(),
+          HeldEffect(),
+          ProgramStates(),
+          ProgramLimitKeys(),
+          ProgramNumericsKeys(),
+          ProgramNumber(),
+          ProgramNext()};
 }
 
 }  // namespace calib::campaign
