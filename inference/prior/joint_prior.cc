@@ -34,7 +34,8 @@ constexpr double kFarthest = 8.2;
 
 absl::StatusOr<JointPrior> JointPrior::Create(std::vector<Prior> marginals,
                                               Eigen::MatrixXd correlation,
-                                              std::vector<LinearConstraint> constraints) {
+                                              std::vector<LinearConstraint> constraints,
+                                              std::vector<MemberBounds> members) {
   JointPrior prior(std::move(marginals));
   const auto d = static_cast<Index>(prior.size());
   RETURN_IF_ERROR(prior.Validate());
@@ -63,7 +64,18 @@ absl::StatusOr<JointPrior> JointPrior::Create(std::vector<Prior> marginals,
                        " coefficients; there are ", d, " parameters, and all must be numbers."));
     }
   }
+  for (const MemberBounds& member : members) {
+    const Index least = std::min({member.common, member.spread, member.score});
+    const Index most = std::max({member.common, member.spread, member.score});
+    if (least < 0 || most >= d || !(member.min <= member.max)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("a member of a population has bounds from ", member.min, " to ", member.max,
+                       " and parameters ", least, " to ", most, " of ", d,
+                       "; the bounds must be ordered and the parameters there."));
+    }
+  }
   prior.constraints_ = std::move(constraints);
+  prior.members_ = std::move(members);
   prior.MeasureMass();
   if (!(prior.log_mass_ > std::log(kLeastMass))) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -74,7 +86,7 @@ absl::StatusOr<JointPrior> JointPrior::Create(std::vector<Prior> marginals,
 }
 
 void JointPrior::MeasureMass() {
-  if (constraints_.empty()) return;
+  if (!is_constrained()) return;
   const auto d = static_cast<int>(size());
   // Row i of a Sobol set does not depend on its size, so a larger set continues the smaller one.
   for (int points = kFewestMassPoints;; points *= 2) {
@@ -102,6 +114,11 @@ absl::Status JointPrior::Validate() const {
 }
 
 bool JointPrior::MeetsConstraints(const Eigen::VectorXd& x) const {
+  const auto inside = [&x](const MemberBounds& m) {
+    const double value = x[m.common] + x[m.spread] * x[m.score];
+    return m.min <= value && value <= m.max;
+  };
+  if (!std::all_of(members_.begin(), members_.end(), inside)) return false;
   return std::all_of(constraints_.begin(), constraints_.end(), [&x](const LinearConstraint& c) {
     double sum = 0;
     for (Index j = 0; j < c.coefficients.size(); ++j) sum += c.coefficients[j] * x[j];

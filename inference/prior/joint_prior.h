@@ -3,6 +3,7 @@
 // constraints where the user says so.
 
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -18,14 +19,22 @@ struct LinearConstraint {
   double limit = 0;
 };
 
+/// Bounds of a value of a population, x[common] + x[spread] x[score]: the member of a hierarchical
+/// model in the coordinates in which its parts are independent [Betancourt & Girolami 2015].
+struct MemberBounds {
+  Eigen::Index common = 0, spread = 0, score = 0;         ///< indices of parameters
+  double min = -std::numeric_limits<double>::infinity();  ///< <= max, in the parameter's unit
+  double max = std::numeric_limits<double>::infinity();
+};
+
 /// Prior of d parameters, p(x) = c(z) prod_j p_j(x_j) [A x <= b] / mass, with z_j =
 /// Phi^-1(F_j(x_j)) the normal score of x_j in its marginal and c the density of the Gaussian
 /// copula
 ///   ln c(z) = -1/2 ln |R| - 1/2 z^T (R^-1 - I) z                                [Song 2000, Eq. 5]
-/// `mass` is the share of the unconstrained prior inside the constraints. Normal and log-normal
-/// marginals without bounds make a multivariate normal (of ln x for the log kind) of correlation R;
-/// a constraint changes the marginals, R is that of the prior before the cut.
-/// A value; thread safety: const.
+/// `mass` is the share of the unconstrained prior inside the constraints and the bounds of members.
+/// Normal and log-normal marginals without bounds make a multivariate normal (of ln x for the log
+/// kind) of correlation R; a constraint changes the marginals, R is that of the prior before the
+/// cut. A value; thread safety: const.
 class JointPrior {
  public:
   JointPrior() = default;
@@ -38,10 +47,12 @@ class JointPrior {
   /// A prior with correlation and constraints. correlation: d x d of the normal scores, unit
   /// diagonal; 0 x 0: independent. Errors: INVALID_ARGUMENT with one sentence for a marginal that
   /// Prior::Validate refuses, a correlation that is not symmetric positive definite, constraints of
-  /// another size, or constraints that leave less than 1e-4 of the prior (an empty prior too).
+  /// another size, members of parameters that are none, or constraints and members that leave less
+  /// than 1e-4 of the prior (an empty prior too).
   static absl::StatusOr<JointPrior> Create(std::vector<Prior> marginals,
                                            Eigen::MatrixXd correlation,
-                                           std::vector<LinearConstraint> constraints);
+                                           std::vector<LinearConstraint> constraints,
+                                           std::vector<MemberBounds> members = {});
 
   std::size_t size() const { return marginals_.size(); }  ///< d
   bool empty() const { return marginals_.empty(); }
@@ -49,7 +60,8 @@ class JointPrior {
   std::vector<Prior>::const_iterator begin() const { return marginals_.begin(); }
   std::vector<Prior>::const_iterator end() const { return marginals_.end(); }
   bool is_independent() const { return correlation_.size() == 0; }
-  bool is_constrained() const { return !constraints_.empty(); }
+  /// By constraints or by bounds of members.
+  bool is_constrained() const { return !constraints_.empty() || !members_.empty(); }
   /// R, of the normal scores of the first parameters (all, unless With added some); 0 x 0:
   /// independent.
   const Eigen::MatrixXd& correlation() const { return correlation_; }
@@ -66,7 +78,7 @@ class JointPrior {
   /// Whether x (d, in the parameters' units) is inside all marginals' bounds and meets the
   /// constraints.
   bool InSupport(const Eigen::VectorXd& x) const;
-  /// Whether x (d, in the parameters' units) meets the constraints.
+  /// Whether x (d, in the parameters' units) meets the constraints and the bounds of members.
   bool MeetsConstraints(const Eigen::VectorXd& x) const;
   /// ln p(x), per unit of the parameters; -infinity outside the support.
   double LogDensity(const Eigen::VectorXd& x) const;
@@ -102,6 +114,7 @@ class JointPrior {
   Eigen::MatrixXd cholesky_;                   // lower
   double log_determinant_ = 0;                 // of R
   std::vector<LinearConstraint> constraints_;  // on the first parameters
+  std::vector<MemberBounds> members_;
   double log_mass_ = 0;
   double mass_error_ = 0;
 };

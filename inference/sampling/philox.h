@@ -33,6 +33,7 @@ enum class StreamPurpose : std::uint64_t {
   kDiagnosisEvidence = 32,
   kDiagnosisForecast = 33,
   kMainDesign = 34,
+  kUnseenMember = 35,
 };
 
 /// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,

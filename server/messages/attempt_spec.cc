@@ -206,7 +206,7 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
   message.set_experiment(measured.name);
   const auto realization = static_cast<std::size_t>(run.stream) % measured.specimens.size();
   message.set_realization(static_cast<int>(realization));
-  dem::Model model = campaign::ModelOf(campaign, run.values);
+  dem::Model model = campaign::ModelOf(campaign, measured, run.values);
   // Effects of the measurement are calculated on what the program answers; it knows none of them.
   std::erase_if(model.effects,
                 [&campaign](const std::string& name) { return !IsDeclared(campaign, name); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -107,6 +108,33 @@ void AddFewGrains(const Campaign& campaign, const Experiment& experiment,
   }
 }
 
+// A spread is not learnt from one label, and a batch may be read by nobody.
+void AddLabels(const Campaign& campaign, std::vector<Warning>& warnings) {
+  bool by_batch = false;
+  for (const Population& population : campaign.populations) {
+    by_batch = by_batch || population.per == Per::kBatch;
+    std::set<std::string> fitted;
+    for (const Experiment& experiment : campaign.experiments) {
+      const std::string& label = LabelOf(population.per, experiment);
+      const bool has = std::find(population.labels.begin(), population.labels.end(), label) !=
+                       population.labels.end();
+      if (has && experiment.role == Role::kCalibrate) fitted.insert(label);
+    }
+    if (fitted.size() > 1) continue;
+    warnings.push_back({WarningKind::kLabels, "", population.name,
+                        absl::StrCat("has one value among the fitted experiments",
+                                     fitted.empty() ? "" : ", of " + *fitted.begin(),
+                                     ": how far values lie apart cannot be learnt from one ",
+                                     WordOf(kPerWords, population.per))});
+  }
+  for (const Experiment& experiment : campaign.experiments) {
+    if (experiment.batch.empty() || by_batch) continue;
+    warnings.push_back({WarningKind::kLabels, experiment.name, "",
+                        absl::StrCat("batch: ", experiment.batch,
+                                     " is read by no parameter; one with per: batch would")});
+  }
+}
+
 }  // namespace
 
 std::vector<Warning> WarningsOf(const Campaign& campaign) {
@@ -121,6 +149,7 @@ std::vector<Warning> WarningsOf(const Campaign& campaign) {
     AddRedundant(experiment, warnings);
     AddFewGrains(campaign, experiment, warnings);
   }
+  AddLabels(campaign, warnings);
   for (Warning& warning : NoiseWarnings(campaign)) warnings.push_back(std::move(warning));
   for (Warning& warning : RunTableWarnings(campaign)) warnings.push_back(std::move(warning));
   return warnings;

@@ -20,6 +20,7 @@ enum class WarningKind {
   kFewGrains,  ///< too few grains for what the test reads
   kScatter,    ///< the readings scatter otherwise than their stated noise says
   kRepeated,   ///< runs made elsewhere repeat the parameters of others
+  kLabels,     ///< labels of experiments from which nothing is learnt
 };
 inline constexpr std::array kWarningKindWords = {
     Word{WarningKind::kUnit, "unit"},
@@ -32,6 +33,7 @@ inline constexpr std::array kWarningKindWords = {
     Word{WarningKind::kFewGrains, "few_grains"},
     Word{WarningKind::kScatter, "scatter"},
     Word{WarningKind::kRepeated, "repeated"},
+    Word{WarningKind::kLabels, "labels"},
 };
 
 struct Warning {

@@ -6,6 +6,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "server/campaign/file/read_population.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/yaml_text.h"
 
@@ -140,7 +141,9 @@ absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivat
   YamlAt(root, "lineage") = YamlMap({{"parent", YamlScalar(derivation.lineage.parent)},
                                      {"purpose", YamlScalar(derivation.lineage.purpose)}});
   ChangeModel(derivation, root);
+  StateLabels(root);
   ChangeExperiments(derivation, root);
+  if (derivation.new_labels) AddLabels(root);
   ChangeInference(derivation, root);
   // Strengths are tried up to where the model breaks: what diverges there is an answer, no fault.
   YamlAt(YamlAt(root, "failure"), "pause_above") = YamlScalar("1");

@@ -26,7 +26,10 @@ struct Derivation {
   std::map<std::string, dem::DefaultPrior> parameters{};
   bool held_out = true;                 ///< false: experiments with role validate are left out
   std::vector<YamlNode> experiments{};  ///< in the place of the parent's, if there are any
-  std::optional<Method> method{};       ///< the keys of the parent's stay: of the same family
+  /// Of parameters with `per`: labels of these experiments that the parent lacks have a value of
+  /// their own; false: they have the common one.
+  bool new_labels = false;
+  std::optional<Method> method{};  ///< the keys of the parent's stay: of the same family
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table or design

@@ -19,14 +19,17 @@ namespace calib::campaign {
 namespace {
 
 // Names stand in tables, file names and on the command line.
-std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
-  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+bool IsShortWord(const std::string& name) {
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
   };
   constexpr std::size_t kLongest = 64;
-  if (map.Has("name") &&
-      (name.empty() || name.size() > kLongest || !std::all_of(name.begin(), name.end(), plain))) {
+  return !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), plain);
+}
+
+std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
+  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+  if (map.Has("name") && !IsShortWord(name)) {
     map.Problem("name",
                 absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
   }
@@ -40,6 +43,15 @@ std::string ReadName(MapReader& map, const ReadContext& context, const Campaign&
     }
   }
   return name;
+}
+
+std::string ReadBatch(MapReader& map) {
+  std::string batch = map.Text("batch").value_or("");
+  if (map.Has("batch") && !IsShortWord(batch)) {
+    map.Problem("batch",
+                absl::StrCat(Quoted(batch), " is not a short word of letters, digits and _ - . +"));
+  }
+  return batch;
 }
 
 // Our name of the control, as far as it can be told before the measurements are read.
@@ -215,6 +227,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   }
   experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
   map.TextList("as_stated");  // read with the parameters
+  experiment.batch = ReadBatch(map);
   if (campaign.program) {
     experiment.specimen_grains = map.Quantity("specimen_grains");
   } else if (campaign.precomputed) {

@@ -355,6 +355,13 @@ void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
 }
 
 void CheckFreeze(MapReader& inference, const Campaign& campaign) {
+  if (!campaign.freeze.empty() && !campaign.populations.empty()) {
+    inference.Problem("freeze",
+                      absl::StrCat("does not go with parameters per experiment or batch (",
+                                   campaign.populations.front().name,
+                                   "), whose parts are not independent of each other"));
+    return;
+  }
   std::set<std::string> held;
   for (const auto& [iteration, freeze] : campaign.freeze) {
     for (const std::string& name : freeze.names) {

@@ -256,16 +256,20 @@ std::optional<std::vector<LinearConstraint>> ReadConstraints(MapReader& map,
 void ReadJointPrior(MapReader& campaign_map, Campaign& campaign) {
   campaign_map.Ignore({"prior_correlation", "constraints"});
   const bool given = campaign_map.Has("prior_correlation") || campaign_map.Has("constraints");
-  if (!given) return;
+  std::vector<inference::MemberBounds> members = MemberBoundsOf(campaign);
+  if (!given && members.empty()) return;
   const std::size_t before = campaign_map.problems().size();
   const auto correlation = ReadCorrelation(campaign_map, campaign);
   auto constraints = ReadConstraints(campaign_map, campaign);
   if (campaign_map.problems().size() > before || !constraints) return;
   const bool constrained = !constraints->empty();
-  auto prior = inference::JointPrior::Create(
-      MarginalPriors(campaign), correlation.value_or(Eigen::MatrixXd{}), *std::move(constraints));
+  auto prior = inference::JointPrior::Create(MarginalPriors(campaign),
+                                             correlation.value_or(Eigen::MatrixXd{}),
+                                             *std::move(constraints), std::move(members));
   if (!prior.ok()) {
-    campaign_map.Problem(constrained ? "constraints" : "prior_correlation",
+    campaign_map.Problem(constrained ? "constraints"
+                         : given     ? "prior_correlation"
+                                     : "parameters",
                          std::string(prior.status().message()));
     return;
   }

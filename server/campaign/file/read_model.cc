@@ -14,6 +14,7 @@
 #include "server/campaign/file/parameters/tied_check.h"
 #include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_materials.h"
+#include "server/campaign/file/read_population.h"
 #include "server/campaign/file/shared/read_prior.h"
 #include "server/campaign/file/shared/read_user_effects.h"
 #include "server/campaign/file/text/quantity.h"
@@ -221,9 +222,16 @@ struct OtherSources {
   bool derived = false;  // from a campaign whose experiments may be no more
 };
 
+void AddCalibrated(CalibratedParameter parameter, const BesidePrior& beside,
+                   const OtherSources& others, MapReader& parameters, Campaign& campaign) {
+  parameter.nuisance = beside.nuisance;
+  campaign.parameters.push_back(std::move(parameter));
+  AddPopulation(beside, others.experiments, parameters, campaign);
+}
+
 // The prior of a setting, or what it is tied to.
 void ReadSetting(MapReader& parameters, const SettingNamed& named, CalibratedParameter parameter,
-                 Campaign& campaign, std::vector<TieAsWritten>& ties) {
+                 const OtherSources& others, Campaign& campaign, std::vector<TieAsWritten>& ties) {
   const std::string& name = parameter.name;
   const YamlNode& node = *parameters.Find(name);
   const std::string path = parameters.PathOf(name);
@@ -238,16 +246,17 @@ void ReadSetting(MapReader& parameters, const SettingNamed& named, CalibratedPar
                     .setting = parameter.setting});
     return;
   }
-  if (const auto prior =
-          ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)) {
+  BesidePrior beside;
+  if (const auto prior = ReadPriorOf(node, path, parameter.unit, parameters.problems(), beside)) {
     parameter.prior = *prior;
     HoldToAdmissible(range, parameter.unit, name, parameters, parameter.prior);
   }
-  campaign.parameters.push_back(std::move(parameter));
+  AddCalibrated(std::move(parameter), beside, others, parameters, campaign);
 }
 
 // A parameter of a program is whatever its prior says.
-void ReadProgramParameter(MapReader& parameters, CalibratedParameter parameter, Campaign& campaign,
+void ReadProgramParameter(MapReader& parameters, CalibratedParameter parameter,
+                          const OtherSources& others, Campaign& campaign,
                           std::vector<TieAsWritten>& ties) {
   const std::string name = parameter.name;
   const YamlNode& node = *parameters.Find(name);
@@ -264,12 +273,12 @@ void ReadProgramParameter(MapReader& parameters, CalibratedParameter parameter, 
   // What an effect's declaration says of its unit holds where these numbers have none.
   const bool as_declared = declared != nullptr && UnitOfPrior(node) == "1";
   if (as_declared) parameter.unit = declared->unit;
-  const auto prior =
-      as_declared
-          ? ReadPriorOf(node, path, parameter.unit, parameters.problems(), parameter.nuisance)
-          : ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance);
+  BesidePrior beside;
+  const auto prior = as_declared
+                         ? ReadPriorOf(node, path, parameter.unit, parameters.problems(), beside)
+                         : ReadFreePrior(node, path, parameters.problems(), parameter.unit, beside);
   if (prior) parameter.prior = *prior;
-  campaign.parameters.push_back(std::move(parameter));
+  AddCalibrated(std::move(parameter), beside, others, parameters, campaign);
 }
 
 void ReadOne(MapReader& parameters, const std::string& name, const OtherSources& others,
@@ -282,14 +291,21 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
     return;
   }
   if (campaign.program) {
-    ReadProgramParameter(parameters, std::move(parameter), campaign, ties);
+    ReadProgramParameter(parameters, std::move(parameter), others, campaign, ties);
     return;
   }
   if (campaign.precomputed) {
+    BesidePrior beside;
     if (const auto prior =
-            ReadFreePrior(node, path, parameters.problems(), parameter.unit, parameter.nuisance)) {
+            ReadFreePrior(node, path, parameters.problems(), parameter.unit, beside)) {
       parameter.prior = *prior;
     }
+    if (beside.per) {
+      parameters.Problem(name,
+                         "cannot differ between experiments: runs made elsewhere have one value of "
+                         "each parameter; leave per out");
+    }
+    parameter.nuisance = beside.nuisance;
     campaign.parameters.push_back(parameter);
     return;
   }
@@ -307,7 +323,7 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
     return;
   }
   if (named.setting) {
-    ReadSetting(parameters, named, std::move(parameter), campaign, ties);
+    ReadSetting(parameters, named, std::move(parameter), others, campaign, ties);
     return;
   }
   if (info == nullptr) {
@@ -324,18 +340,19 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
                     .text = ReadTie(node, path, parameters.problems()).value_or("")});
     return;
   }
+  BesidePrior beside;
   if (node.kind == YamlNode::Kind::kScalar && node.scalar == "default") {
     parameter.prior.kind = info->default_prior.kind == "log_uniform"
                                ? inference::PriorKind::kLogUniform
                                : inference::PriorKind::kUniform;
     parameter.prior.min = info->default_prior.min;
     parameter.prior.max = info->default_prior.max;
-  } else if (const auto prior = ReadPriorOf(node, path, parameter.unit, parameters.problems(),
-                                            parameter.nuisance)) {
+  } else if (const auto prior =
+                 ReadPriorOf(node, path, parameter.unit, parameters.problems(), beside)) {
     parameter.prior = *prior;
     HoldToAdmissible(AdmissibleRange(*info), parameter.unit, name, parameters, parameter.prior);
   }
-  campaign.parameters.push_back(parameter);
+  AddCalibrated(std::move(parameter), beside, others, parameters, campaign);
 }
 
 void CheckSources(const MapReader& campaign_map, const Campaign& campaign,
@@ -455,9 +472,11 @@ void ReadParameters(MapReader& campaign_map, bool is_new, Campaign& campaign) {
   }
   const std::size_t before = campaign_map.problems().size();
   OtherSources others;
-  if (!campaign.model.contact.empty()) {  // of runs that this program's DEM makes
+  if (!campaign.precomputed) {
     others = {.experiments = OutlinesOf(campaign_map.Find("experiments")),
               .derived = campaign_map.Has("lineage")};
+  }
+  if (!campaign.model.contact.empty()) {  // of runs that this program's DEM makes
     if (is_new) CheckExperimentNames(others.experiments, campaign, campaign_map.problems());
   }
   std::vector<std::string> seen;

@@ -22,9 +22,12 @@ void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Ca
   campaign.table->like.push_back(static_cast<int>(map.Integer("like").value_or(row)));
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const CalibratedParameter& parameter = campaign.parameters[j];
-    const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr
-                           ? map.Quantity(parameter.name, parameter.unit, {})
-                           : std::nullopt;
+    // Without spread and scores every experiment has the common value.
+    const bool given =
+        parameter.of_population
+            ? map.Has(parameter.name)
+            : map.Require(parameter.name, "every row gives every parameter") != nullptr;
+    const auto value = given ? map.Quantity(parameter.name, parameter.unit, {}) : std::nullopt;
     campaign.table->parameters(row, static_cast<Eigen::Index>(j)) = value.value_or(0);
   }
   map.Finish();

@@ -48,6 +48,8 @@ Section ExperimentKeys() {
            "a setting of the test, e.g. `confining_pressure`"},
           {"role", OneWord(kRoleWords), WordOf(kRoleWords, Role::kCalibrate),
            "`validate` is never fitted, reported as held-out error"},
+          {"batch", Text(), "none", "what its specimen was made with, for parameters `per: batch`",
+           "letters, digits, `_ - . +`"},
           {"as_stated", OneOrMore(Text()), "nothing",
            "settings that no parameter changes here; `predict` writes what stands in its test"},
           {"packing", MapOf("packing"), "required where the test needs one", "the specimen"},

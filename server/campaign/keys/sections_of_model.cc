@@ -5,6 +5,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/keys/sections.h"
 #include "server/campaign/keys/words.h"
+#include "server/campaign/model/population.h"
 #include "server/campaign/model/words.h"
 
 namespace calib::campaign {
@@ -154,6 +155,12 @@ Section ParameterKeys() {
   std::vector<Key> keys = KeysOfPrior();
   keys.push_back({"nuisance", TrueOrFalse(), "false",
                   "it is inferred, and not reported among what is wanted"});
+  keys.push_back({"per", OneWord(kPerWords), "one value",
+                  "it has a value for each experiment, or for each `batch`"});
+  keys.push_back({"spread", MapOf("spread"), "required with `per`",
+                  "prior of the sd of these values around the common one"});
+  keys.push_back({"labels", OneOrMore(Text()), "of all experiments",
+                  "with `per`: what has a value of its own; others have the common one"});
   return {"parameter", "parameters.NAME", std::move(keys)};
 }
 
@@ -163,6 +170,15 @@ Section ErrorScaleKeys() {
   keys.push_back({"on", OneWord(kErrorScaleWords), "sd",
                   "what the numbers are of: the standard deviation, or its square"});
   return {"error_scale", "noise.model_error[].relative, absolute", std::move(keys)};
+}
+
+Section Spread() {
+  return {"spread",
+          "parameters.NAME.spread",
+          {{"prior", OneWord({"half_normal"}), kRequired, "the family"},
+           {"sd", NumberOfCatalogue(), kRequired,
+            "standard deviation of the normal of which this is the half, in the parameter's "
+            "unit"}}};
 }
 
 Section Tie() {
@@ -269,8 +285,9 @@ std::vector<Section> SectionsOfModel() {
           Parameters(),
           PriorKeys(),
           ParameterKeys(),
-          Tie(),
           ErrorScaleKeys(),
+          Spread(),
+          Tie(),
           Materials(),
           Material(),
           Pairs(),

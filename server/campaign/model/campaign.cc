@@ -199,7 +199,7 @@ bool HasNamesOfItsOwn(const Campaign& campaign, const Experiment& experiment) {
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
                            const RunOf& run) {
   dem::Scenario scenario;
-  scenario.model = ModelOf(campaign, run.values);
+  scenario.model = ModelOf(campaign, experiment, run.values);
   scenario.test = experiment.test;
   scenario.settings = experiment.settings;
   scenario.materials = experiment.materials;

@@ -16,6 +16,7 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
 #include "inference/tmcmc/tmcmc.h"
+#include "server/campaign/model/population.h"
 #include "server/campaign/model/program.h"
 #include "server/campaign/model/tied_parameters.h"
 #include "server/campaign/model/words.h"
@@ -28,6 +29,7 @@ struct CalibratedParameter {
   inference::Prior prior;
   bool nuisance = false;               ///< inferred, and not reported among what is wanted
   std::optional<SettingOf> setting{};  ///< empty: a parameter of the model
+  bool of_population = false;          ///< a spread or a score: no run reads it (population.h)
 };
 
 /// Stated error of a reading as a function of what is read: sd = absolute, or
@@ -100,7 +102,8 @@ struct MeshFile {
 
 struct Experiment {
   std::string name;
-  std::string test;  ///< may be empty when precomputed, or run by a program
+  std::string test;     ///< may be empty when precomputed, or run by a program
+  std::string batch{};  ///< whose specimens were made together; empty: not said
   std::map<std::string, double> settings;
   Role role = Role::kCalibrate;
   /// Realizations: sample i uses specimen i mod size. A PackingLike stands behind all files. Empty
@@ -246,6 +249,8 @@ struct Campaign {
   std::vector<CalibratedParameter> parameters;
   /// Parameters that follow from these and the fixed ones, each behind those that it follows from.
   std::vector<TiedParameter> tied{};
+  /// Parameters that have a value for each experiment or batch.
+  std::vector<Population> populations{};
   /// Where correlations or constraints tie them; their priors are its marginals.
   std::optional<inference::JointPrior> tied_prior;
   std::vector<Experiment> experiments;

@@ -95,6 +95,7 @@ const dem::ParameterInfo* FindNumerics(const std::string& name) {
 }
 
 std::string EffectNamedIn(const std::string& parameter) {
+  if (parameter.find('@') != std::string::npos) return "";  // of a label, which may be any word
   const std::size_t last = parameter.rfind('.');
   if (last == std::string::npos) return "";
   const std::size_t before = parameter.rfind('.', last - 1);
@@ -145,7 +146,9 @@ std::vector<std::string> ActiveEffects(const Campaign& campaign, std::span<const
   return active;
 }
 
-dem::Model ModelOf(const Campaign& campaign, std::span<const double> values) {
+dem::Model ModelOf(const Campaign& campaign, const Experiment& experiment,
+                   std::span<const double> common) {
+  const std::vector<double> values = ValuesIn(campaign, experiment, common);
   dem::Model model = campaign.model;
   const std::vector<std::string> active = ActiveEffects(campaign, values);
   model.effects.insert(model.effects.end(), active.begin(), active.end());
@@ -154,7 +157,7 @@ dem::Model ModelOf(const Campaign& campaign, std::span<const double> values) {
     const std::string& name = campaign.parameters[j].name;
     const std::string effect = EffectNamedIn(name);
     const bool absent =
-        campaign.parameters[j].setting ||
+        campaign.parameters[j].setting || campaign.parameters[j].of_population ||
         (is_design && (FindNumerics(name) != nullptr ||
                        (IsOneOf(campaign.race, effect) && !IsOneOf(active, effect))));
     if (!absent) model.parameters[name] = values[j];

@@ -23,7 +23,7 @@ inline constexpr const char* kNumerics = "numerics";
 const dem::ParameterInfo* FindNumerics(const std::string& name);
 
 /// The effect that a dotted parameter name is of: X of "X.friction" and of "A-B.X.friction"; "" of
-/// a plain name.
+/// a plain name, and of a name with a label.
 std::string EffectNamedIn(const std::string& parameter);
 
 /// The model with all effects of the race: whose parameters a campaign may calibrate. It cannot run
@@ -41,8 +41,9 @@ std::vector<std::string> StrengthsOf(const Campaign& campaign, const std::string
 /// Campaign::parameters.
 std::vector<std::string> ActiveEffects(const Campaign& campaign, std::span<const double> values);
 
-/// Contact law, effects and parameters of a run. values: likewise.
-dem::Model ModelOf(const Campaign& campaign, std::span<const double> values);
+/// Contact law, effects and parameters of a run of an experiment. values: likewise.
+dem::Model ModelOf(const Campaign& campaign, const Experiment& experiment,
+                   std::span<const double> values);
 
 /// Applies what a run's values say of the numerics to the scenario of an experiment that has
 /// everything else but its packing.

@@ -37,8 +37,9 @@ bool Concerns(const std::optional<SettingOf>& setting, const Experiment& experim
 
 // Every number that the values set in this experiment, in the order of parameters, then of ties.
 void ForEachNumber(const Campaign& campaign, const Experiment& experiment,
-                   std::span<const double> values,
+                   std::span<const double> common,
                    const std::function<void(const std::string&, double)>& take) {
+  const std::vector<double> values = ValuesIn(campaign, experiment, common);
   const auto give = [&](const SettingOf& setting, double value) {
     take(setting.number, setting.whole ? std::round(value) : value);
   };

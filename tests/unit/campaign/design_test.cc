@@ -68,12 +68,13 @@ TEST(Design, AnEffectIsInTheRunWhereOneOfItsStrengthsLeavesItsNull) {
   const Campaign c = ReadDesign(DesignYaml(kCell, ", race: [load_cell_error]"));
   const std::vector<double> null = {1e9, 0.5, 0.1, 0.1, 0, 0};
   EXPECT_THAT(ActiveEffects(c, null), IsEmpty());
-  EXPECT_EQ(ModelOf(c, null).parameters.count("load_cell_error.gain"), 0U);
-  EXPECT_EQ(ModelOf(c, null).effects, c.model.effects);
+  EXPECT_EQ(ModelOf(c, c.experiments[0], null).parameters.count("load_cell_error.gain"), 0U);
+  EXPECT_EQ(ModelOf(c, c.experiments[0], null).effects, c.model.effects);
   const std::vector<double> gain = {1e9, 0.5, 0.1, 0.1, 1e-300, 0};
   EXPECT_THAT(ActiveEffects(c, gain), ElementsAre("load_cell_error"));
-  EXPECT_EQ(ModelOf(c, gain).parameters.at("load_cell_error.offset"), 0);
-  EXPECT_THAT(ModelOf(c, gain).effects, ElementsAre("rolling_resistance", "load_cell_error"));
+  EXPECT_EQ(ModelOf(c, c.experiments[0], gain).parameters.at("load_cell_error.offset"), 0);
+  EXPECT_THAT(ModelOf(c, c.experiments[0], gain).effects,
+              ElementsAre("rolling_resistance", "load_cell_error"));
   EXPECT_THAT(ActiveEffects(c, std::vector<double>{1e9, 0.5, 0, 0, 0, 5}),
               ElementsAre("load_cell_error"))
       << "an effect of the model itself is always in it";

@@ -201,6 +201,7 @@ void Put(const std::vector<std::string>& path, double value, int line, YamlNode&
 ExperimentOutline OutlineOf(const YamlNode& experiment) {
   ExperimentOutline outline{.name = TextAt(experiment, {"name"}), .line = experiment.line};
   outline.test = dem::FindTest(TextAt(experiment, {"test"}));
+  outline.batch = TextAt(experiment, {"batch"});
   outline.control = TextAt(experiment, {"control"});
   if (outline.control.empty()) outline.control = TextAt(experiment, {"control", "column"});
   outline.sizes = SizesOf(experiment);

@@ -24,6 +24,7 @@ struct ExperimentOutline {
   SizesBy sizes = SizesBy::kNone;
   std::set<std::string> stated{};     ///< numbers whose value stands in the file
   std::set<std::string> as_stated{};  ///< that no parameter changes
+  std::string batch{};
 };
 
 /// As the file has it, whatever is wrong with it.

@@ -308,6 +308,11 @@ std::vector<std::string> ParameterNotes(const Campaign& campaign) {
                                    : "",
         "."));
   }
+  for (const Population& population : campaign.populations) {
+    notes.push_back(absl::StrCat(population.name, " has a value for each ",
+                                 WordOf(kPerWords, population.per),
+                                 " around a common one: ", Listed(population.labels), "."));
+  }
   for (const TiedParameter& tied : campaign.tied) {
     notes.push_back(absl::StrCat(tied.name, " = ", tied.text, "."));
   }

@@ -118,6 +118,36 @@ std::string SquareOf(const std::string& unit) {
                  .radian = 2 * one.radian});
 }
 
+// A normal of mean 0 cut off below it. Empty after a problem.
+std::optional<Prior> ReadSpread(MapReader& parameter, const std::string& unit) {
+  auto map = parameter.Map("spread");
+  if (!map) return std::nullopt;
+  map->Require("prior", "half_normal");
+  map->Choice("prior");
+  const double sd = Required(*map, "sd", unit, {.min = 0, .min_open = true}, "half_normal");
+  map->Finish();
+  if (std::isnan(sd)) return std::nullopt;
+  return Prior{.kind = PriorKind::kNormal, .min = 0, .mean = 0, .sd = sd};
+}
+
+BesidePrior ReadBeside(MapReader& map, const std::string& unit) {
+  BesidePrior beside{.nuisance = map.TrueOrFalse("nuisance").value_or(false)};
+  const bool has = map.Has("per");
+  beside.per = map.Choice("per", kPerWords);
+  if (has && !map.Has("spread")) {
+    map.Problem("per",
+                "needs spread, the prior of how far the values lie apart, e.g. {prior: "
+                "half_normal, sd: 0.05}");
+  }
+  for (const char* key : {"spread", "labels"}) {
+    if (has || !map.Has(key)) continue;
+    map.Problem(key, "belongs to per: experiment or per: batch; without it there is one value");
+  }
+  beside.spread = ReadSpread(map, unit);
+  beside.labels = map.TextList("labels");
+  return beside;
+}
+
 // The SI unit that the numbers of a free prior carry; the first that has one decides.
 std::string UnitOfNumbers(MapReader& map) {
   if (const auto unit = map.Text("unit")) {
@@ -159,7 +189,8 @@ std::optional<std::string> ReadTie(const YamlNode& node, const std::string& path
                                    ProblemList& problems) {
   if (!IsTied(node)) return std::nullopt;
   MapReader map(node, path, SectionOf("tie"), problems);
-  for (const char* key : {"prior", "min", "max", "mean", "sd", "nuisance"}) {
+  for (const char* key :
+       {"prior", "min", "max", "mean", "sd", "nuisance", "per", "spread", "labels"}) {
     if (!map.Has(key)) continue;
     map.Problem(key, "has no place beside equal_to: what follows from others is not inferred");
     map.Ignore({key});
@@ -172,10 +203,10 @@ std::optional<std::string> ReadTie(const YamlNode& node, const std::string& path
 
 std::optional<Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
                                  const std::string& si_unit, ProblemList& problems,
-                                 bool& nuisance) {
+                                 BesidePrior& beside) {
   MapReader map(node, path, SectionOf("parameter"), problems);
   if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
-  nuisance = map.TrueOrFalse("nuisance").value_or(false);
+  beside = ReadBeside(map, si_unit);
   return ReadFrom(map, si_unit);
 }
 
@@ -196,11 +227,12 @@ std::optional<inference::ErrorScale> ReadErrorScale(const YamlNode& node, const 
 }
 
 std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
-                                   ProblemList& problems, std::string& si_unit, bool& nuisance) {
+                                   ProblemList& problems, std::string& si_unit,
+                                   BesidePrior& beside) {
   MapReader map(node, path, SectionOf("parameter"), problems);
   if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
-  nuisance = map.TrueOrFalse("nuisance").value_or(false);
   si_unit = UnitOfNumbers(map);
+  beside = ReadBeside(map, si_unit);
   return ReadFrom(map, si_unit);
 }
 

@@ -3,10 +3,12 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "inference/data/model_error.h"
 #include "inference/prior/prior.h"
 #include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/model/population.h"
 
 namespace calib::campaign {
 
@@ -30,10 +32,18 @@ std::optional<std::string> ReadTie(const YamlNode& node, const std::string& path
                                    ProblemList& problems);
 bool IsTied(const YamlNode& node);
 
-/// ReadPrior() and whether the parameter is a nuisance.
+/// What a parameter's map says beside its prior.
+struct BesidePrior {
+  bool nuisance = false;
+  std::optional<Per> per{};
+  std::optional<inference::Prior> spread{};          ///< with `per`
+  std::optional<std::vector<std::string>> labels{};  ///< with `per`; empty: all there are
+};
+
+/// ReadPrior() and what stands beside it. A problem where `per` and `spread` are not both there.
 std::optional<inference::Prior> ReadPriorOf(const YamlNode& node, const std::string& path,
                                             const std::string& si_unit, ProblemList& problems,
-                                            bool& nuisance);
+                                            BesidePrior& beside);
 
 /// The prior of a standard deviation in si_unit, or with `on: variance` of its square, at 0 or
 /// above.
@@ -45,6 +55,6 @@ std::optional<inference::ErrorScale> ReadErrorScale(const YamlNode& node, const 
 /// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).
 std::optional<inference::Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
                                               ProblemList& problems, std::string& si_unit,
-                                              bool& nuisance);
+                                              BesidePrior& beside);
 
 }  // namespace calib::campaign

@@ -65,9 +65,9 @@ TEST(TiedParameters, MayFollowFromFixedAndTiedOnesInAnyOrder) {
       "2e0*rolling_resistance.friction)\"}\n"));
   EXPECT_THAT(NamesOfTied(c),
               ElementsAre("twisting_resistance.friction", "twisting_resistance.stiffness"));
-  const dem::Model at_most = ModelOf(c, std::vector<double>{1e9, 0.5, 0.25, 0.5});
+  const dem::Model at_most = ModelOf(c, c.experiments[0], std::vector<double>{1e9, 0.5, 0.25, 0.5});
   EXPECT_EQ(at_most.parameters.at("twisting_resistance.friction"), 0.2);
-  const dem::Model below = ModelOf(c, std::vector<double>{1e9, 0.5, 0.25, 0.05});
+  const dem::Model below = ModelOf(c, c.experiments[0], std::vector<double>{1e9, 0.5, 0.25, 0.05});
   EXPECT_EQ(below.parameters.at("twisting_resistance.friction"), 0.1);
   EXPECT_DOUBLE_EQ(below.parameters.at("twisting_resistance.stiffness"), 0.01);
 }
@@ -100,7 +100,8 @@ TEST(TiedParameters, StayInWhatIsDerived) {
   ASSERT_TRUE(design.ok());
   const Campaign runs = ReadTied(*design);
   const Eigen::VectorXd row = runs.table->parameters.row(0);
-  const dem::Model model = ModelOf(runs, {row.data(), static_cast<std::size_t>(row.size())});
+  const dem::Model model =
+      ModelOf(runs, runs.experiments[0], {row.data(), static_cast<std::size_t>(row.size())});
   EXPECT_EQ(model.parameters.at("twisting_resistance.stiffness"), 0.3);
   EXPECT_EQ(model.parameters.at("twisting_resistance.friction"), 0.2);
   EXPECT_EQ(model.parameters.count("load_cell_error.gain"), 0U);
