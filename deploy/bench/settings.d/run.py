@@ -120,7 +120,7 @@ def silo(bench):
     known = [head, (0.032, weighed(0.032, 201))]
     for seed, opening in ((101, 0.020), (102, 0.025), (103, 0.030)):
         rows = [head, (0.022, weighed(opening, seed))]  # what stands for the opening is replaced
-        for name, words in (("silo", "known"), ("silo_friction", "wanted")):
+        for name, words in (("silo", "known"), ("silo_friction", "wanted"))[:1 + (seed == 102)]:
             folder = bench.folder(f"{name}/{seed}", (HERE / f"{name}.yaml").read_text(), silo=rows, known=known)
             found = bench.run(folder)
             width, mu = found["parameters"]["silo.opening"], found["parameters"].get("friction_coefficient")
@@ -129,20 +129,18 @@ def silo(bench):
 
 
 def toyoura(bench):
-    """One stiffness and one limit for rolling and twisting (equal_to) on Toyoura sand at 0.2 MPa; rolling alone beside it."""
-    text = (HERE / "toyoura.yaml").read_text()
-    alone = replaced(text, (", twisting_resistance]", "]"), *((line, "") for line in text.splitlines(True) if "equal_to" in line))
+    """One stiffness and one limit for rolling and twisting (equal_to) on Toyoura sand at 0.2 MPa."""
     names = {"young_modulus": 1e-9, "poisson_ratio": 1, "rolling_resistance.stiffness": 1, "rolling_resistance.friction": 1,
              "friction_angle": 180 / math.pi}
-    print("| law | E [GPa] | nu | stiffness [N m/rad] | limit | friction [deg] | error [sd] | p | ESS | emulator's error [sd] | "
-          "runs |\n|---|---|---|---|---|---|---|---|---|---|---|")
-    for name, model in (("rolling = twisting", text), ("rolling alone", alone)):
-        folder = bench.folder(f"toyoura/{name.replace(' ', '-')}", model)
-        found = bench.run(folder)
-        fit = bench.ask(folder, "compare", "c1")
-        cells = [shown(found["parameters"][one], factor) for one, factor in names.items()]
-        print(f"| {name} | {' | '.join(cells)} | {fit['rms_error']:.2f} | {fit['p_value']:.2g} | {found['ess']:.1f} | "
-              f"{found['emulator']['cross_validated_error']:.2g} | {found['model_evaluations']} |", flush=True)
+    folder = bench.folder("toyoura", (HERE / "toyoura.yaml").read_text())
+    found = bench.run(folder)
+    fit = bench.ask(folder, "compare", "c1")
+    cells = [shown(found["parameters"][one], factor) for one, factor in names.items()]
+    errors = ", ".join(f"{one['observable']} {one['rms_error']:.2f}" for one in fit["by_observable"])
+    print("| E [GPa] | nu | stiffness [N m/rad] | limit | friction [deg] | error [sd] | p | ESS | emulator's error [sd] | runs |\n"
+          "|---|---|---|---|---|---|---|---|---|---|")
+    print(f"| {' | '.join(cells)} | {fit['rms_error']:.2f}: {errors} | {fit['p_value']:.2g} | {found['ess']:.1f} | "
+          f"{found['emulator']['cross_validated_error']:.2g} | {found['model_evaluations']} |", flush=True)
 
 
 def funnel(askew):
