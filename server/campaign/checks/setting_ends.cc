@@ -57,9 +57,11 @@ std::string WhyNoSetting(const CalibratedParameter& parameter, const Experiment&
 std::string WhyNotAtEnds(const Campaign& campaign, const Experiment& experiment, std::size_t j) {
   const CalibratedParameter& parameter = campaign.parameters[j];
   const inference::Prior& prior = parameter.prior;
-  for (const double end :
-       {std::isfinite(prior.min) ? prior.min : prior.Quantile(kTailOfSetting),
-        std::isfinite(prior.max) ? prior.max : prior.Quantile(1 - kTailOfSetting)}) {
+  // A normal reaches the bounds where it is cut off, those of the number itself too, with no mass.
+  const bool by_bounds = prior.kind == inference::PriorKind::kUniform ||
+                         prior.kind == inference::PriorKind::kLogUniform;
+  for (const double end : {by_bounds ? prior.min : prior.Quantile(kTailOfSetting),
+                           by_bounds ? prior.max : prior.Quantile(1 - kTailOfSetting)}) {
     std::vector<double> values = MiddleValues(campaign);
     values[j] = end;
     const std::string why = WhyImpossible(campaign, experiment, values);

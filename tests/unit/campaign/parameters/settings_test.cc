@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <variant>
 
+#include "absl/strings/str_cat.h"
 #include "server/campaign/file/derive.h"
 #include "server/campaign/file/parameters/setting_names.h"
 #include "server/campaign/file/text/yaml_text.h"
@@ -176,6 +177,16 @@ TEST(CalibratedSettings, ThatATestCannotHaveAtAnEndOfTheirPriorAreRefused) {
   EXPECT_THAT(ToString(outcome.problems[0]),
               HasSubstr("parameters.silo_width: makes outlet impossible at 0.001 m, an end of its "
                         "prior: "));
+}
+
+// It is cut off at the admissible range, whose end no run comes to.
+TEST(CalibratedSettings, MayHaveANormalPriorWithoutBounds) {
+  for (const char* prior : {"{prior: normal, mean: 0.2 MPa, sd: 0.02 MPa}",
+                            "{prior: log_normal, mean: 0.2 MPa, sd: 0.1}"}) {
+    const Campaign c =
+        ReadGood(WithLines(absl::StrCat("  tx02.confining_pressure: ", prior, "\n")));
+    EXPECT_GT(c.parameters.back().prior.Quantile(0.001), 0.1e6) << prior;
+  }
 }
 
 TEST(CalibratedSettings, OfWhatADerivedCampaignHasNotChangeNothing) {
