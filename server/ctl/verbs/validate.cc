@@ -81,9 +81,6 @@ std::vector<std::string> NotActedOn(const campaign::Program& program, const std:
     sentences.emplace_back(
         "model.checkpoint: no checkpoint is asked for; a run that is tried again begins anew.");
   }
-  if (!program.numerics.empty()) {
-    sentences.emplace_back("model.numerics: diagnose does not try them.");
-  }
   const campaign::YamlParse parsed = campaign::ParseYaml(yaml);
   const campaign::YamlNode* model =
       parsed.root ? campaign::YamlFind(*parsed.root, "model") : nullptr;

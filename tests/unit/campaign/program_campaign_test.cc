@@ -187,6 +187,10 @@ TEST(ProgramCampaign, ATestThatIsNamedHasItsObservablesUnitsAndRanges) {
   const ReadOutcome outcome = ReadProgramYaml(yaml, files);
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   EXPECT_EQ(outcome.campaign.experiments[0].settings.at("confining_pressure"), 2e5);
+  const Campaign unnamed = ReadProgramYaml(ProgramYaml()).campaign;
+  const RunOf values{.values = {2e3, 0.5}, .stream = 0};
+  EXPECT_EQ(messages::ProgramRunOf(outcome.campaign, 0, values).test(), "triaxial_drained");
+  EXPECT_EQ(messages::ProgramRunOf(unnamed, 0, values).test(), "");
   EXPECT_DOUBLE_EQ(outcome.campaign.experiments[0].control[1], -std::log1p(-0.01));
   EXPECT_THAT(ProblemsOf(absl::StrReplaceAll(yaml, {{"0.2 MPa", "-1 MPa"}}), files),
               HasSubstr("confining_pressure"));
@@ -233,11 +237,38 @@ TEST(ProgramCampaign, RefusesWhatCannotBeMeantInOneSentenceEach) {
        "command is missing"},
       {absl::StrCat(ProgramYaml(), "early_stopping: {discard_at_most: 1e-3, rungs: [0.5]}\n"),
        "would begin anew"},
+      {SpoiledProgram("  version:", "  numerics: {seed: {null: 1, sd: 1}}\n  version:"),
+       "numerics.seed is a reserved name"},
+      {SpoiledProgram("  version:", "  numerics: {friction: {null: 1, sd: 1}}\n  version:"),
+       "what is calibrated matters"},
+      {SpoiledProgram("  version:", "  numerics: {rate: {null: 1, sd: 1}}\n  version:"),
+       "the name of a setting and of a parameter"},
+      {SpoiledProgram("  version:", "  numerics: {step: {null: 1, sd: 0}}\n  version:"),
+       "model.numerics.step.sd"},
+      {SpoiledProgram("  version:", "  numerics: {step: {null: 1}}\n  version:"), "sd: is missing"},
       {SpoiledProgram("inference:", "failure: {at_limit: perhaps}\ninference:"), "at_limit"},
   };
   for (const auto& one : cases) {
     EXPECT_THAT(ProblemsOf(one.yaml, ProgramFiles()), HasSubstr(one.says));
   }
+}
+
+TEST(ProgramCampaign, SettingsThatShouldNotMatterAreToldAtTheirNull) {
+  const ReadOutcome outcome = ReadProgramYaml(SpoiledProgram(
+      "  version:", "  numerics: {time_step_factor: {null: 0.8, sd: 0.2}}\n  version:"));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  const auto told = [](const Campaign& campaign, std::vector<double> values) {
+    const v1::ProgramRun run =
+        messages::ProgramRunOf(campaign, 0, {.values = std::move(values), .stream = 0});
+    EXPECT_EQ(run.parameters_size(), 3);  // what a design calls it has no part in the request
+    return run.parameters().at("time_step_factor");
+  };
+  EXPECT_EQ(told(outcome.campaign, {2e3, 0.5}), 0.8);
+  Campaign design = outcome.campaign;
+  design.method = Method::kDesign;
+  design.parameters.push_back({.name = "numerics.time_step_factor", .unit = "1", .prior = {}});
+  EXPECT_EQ(told(design, {2e3, 0.5, 1}), 1);
+  EXPECT_EQ(told(design, {2e3, 0.5, 0.8}), 0.8);
 }
 
 TEST(ProgramCampaign, TestsThatMayBeProposedAreHeldToTheirForm) {

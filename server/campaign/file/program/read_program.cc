@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
+#include "dem/registry/declared_effects.h"
 #include "server/campaign/file/shared/read_user_effects.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
@@ -246,6 +247,34 @@ void ReadNext(MapReader& model) {
   }
 }
 
+// A name of the numerics stands for one thing in a request and a design.
+void CheckNumerics(const MapReader& campaign_map, const Campaign& campaign,
+                   const std::set<std::string>& parameters) {
+  const auto& declared = campaign.model.user_effects;
+  const std::string prefix = absl::StrCat(kNumerics, ".");
+  for (const auto& [name, choice] : campaign.program->numerics) {
+    if (std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end()) {
+      campaign_map.Problem("model",
+                           absl::StrCat("numerics.", name, " is a reserved name; call it another"));
+    }
+    if (parameters.contains(name)) {
+      campaign_map.Problem("model", absl::StrCat("numerics.", name,
+                                                 " is a parameter as well: what is calibrated "
+                                                 "matters; keep one of them"));
+    }
+    if (campaign.method != Method::kDesign && parameters.contains(prefix + name)) {
+      campaign_map.Problem(
+          "parameters", absl::StrCat(prefix, name, " is what diagnose calls the change of ", name,
+                                     "; call the parameter another"));
+    }
+  }
+  if (!campaign.program->numerics.empty() && dem::FindEffect(declared, kNumerics) != nullptr) {
+    campaign_map.Problem("model", absl::StrCat("effects.", kNumerics,
+                                               " is what diagnose calls changes of the numerics; "
+                                               "call the effect another"));
+  }
+}
+
 }  // namespace
 
 bool NamesProgram(const MapReader& model) { return model.Has("command"); }
@@ -292,6 +321,8 @@ void CheckProgram(const MapReader& campaign_map, const Campaign& campaign) {
                                         "} stands for what the worker says; call it another"));
     }
   }
+  CheckNumerics(campaign_map, campaign, parameters);
+  for (const auto& [name, choice] : campaign.program->numerics) parameters.insert(name);
   for (const Experiment& experiment : campaign.experiments) {
     std::set<std::string> told;
     for (const auto& [name, value] : experiment.told) told.insert(name);
