@@ -173,6 +173,8 @@ std::string NextText(const NextExperiment& next) {
     text += "  " + InWords(planned) + ": ";
     if (planned.forecast) {
       text += ForecastInWords(*planned.forecast) + "\n";
+    } else if (planned.of_next) {
+      text += "not known\n";
     } else {
       text += planned.expected_power < kToldApart
                   ? "at first sight tells none of them apart\n"

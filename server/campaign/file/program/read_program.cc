@@ -224,29 +224,6 @@ void ReadNumerics(MapReader& model, Program& program) {
   map->Finish();
 }
 
-// Tests that could be proposed: held to their form, and to nothing else yet.
-void ReadNext(MapReader& model) {
-  const YamlNode* node = model.Find("next");
-  if (node == nullptr) return;
-  if (node->kind != YamlNode::Kind::kSequence) {
-    model.Problem("next", "has to be a list of tests, each beginning with '- name: ...'");
-    return;
-  }
-  for (std::size_t i = 0; i < node->items.size(); ++i) {
-    MapReader test(node->items[i], absl::StrCat(model.PathOf("next"), "[", i + 1, "]"),
-                   SectionOf("program_next"), model.problems());
-    test.RequiredText("name", "what the test is called");
-    test.RequiredText("control", "the column that drives it");
-    test.Require("values", "of the control, e.g. [1 percent, 2 percent]");
-    test.TextList("values");
-    if (auto settings = test.Map("settings")) {
-      settings->Ignore(settings->Keys());
-      settings->Finish();
-    }
-    test.Finish();
-  }
-}
-
 // A name of the numerics stands for one thing in a request and a design.
 void CheckNumerics(const MapReader& campaign_map, const Campaign& campaign,
                    const std::set<std::string>& parameters) {
@@ -300,7 +277,7 @@ void ReadProgram(MapReader& model, ReadContext& context, Campaign& campaign) {
   ReadLimitsOf(model, program.limits);
   ReadHeldEffects(model, context.is_new(), "the program of the campaign", campaign.model);
   ReadNumerics(model, program);
-  ReadNext(model);
+  model.Ignore({"next"});  // read behind the experiments
   if (model.Has("command")) CheckCommand(model, context, program);
   if (program.persistent && program.states) {
     model.Problem("states",
@@ -323,7 +300,9 @@ void CheckProgram(const MapReader& campaign_map, const Campaign& campaign) {
   }
   CheckNumerics(campaign_map, campaign, parameters);
   for (const auto& [name, choice] : campaign.program->numerics) parameters.insert(name);
-  for (const Experiment& experiment : campaign.experiments) {
+  std::vector<Experiment> experiments = campaign.experiments;
+  experiments.insert(experiments.end(), campaign.next.begin(), campaign.next.end());
+  for (const Experiment& experiment : experiments) {
     std::set<std::string> told;
     for (const auto& [name, value] : experiment.told) told.insert(name);
     for (const Specimen& specimen : experiment.specimens) {

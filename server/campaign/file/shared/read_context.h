@@ -56,4 +56,8 @@ class ReadContext {
   std::vector<std::string> files_;
 };
 
+/// The key `name` of an experiment, which stands in tables, file names and on the command line.
+/// is_new: as ReadContext.
+std::string ReadShortName(MapReader& map, bool is_new);
+
 }  // namespace calib::campaign
