@@ -72,10 +72,6 @@ std::string ProgramText(const campaign::Program& program) {
 // Of what the file says of a program what nothing acts on, so that nobody counts on it.
 std::vector<std::string> NotActedOn(const campaign::Program& program) {
   std::vector<std::string> sentences;
-  if (!program.keep.empty()) {
-    sentences.emplace_back(
-        "model.keep: these files are not brought to the server; they go with the scratch folder.");
-  }
   if (program.checkpoint) {
     sentences.emplace_back(
         "model.checkpoint: no checkpoint is asked for; a run that is tried again begins anew.");

@@ -23,6 +23,8 @@ namespace {
 /// Files that one program brings at most: as many as a submission may name, with room for its data
 /// and packings.
 constexpr std::size_t kMostFiles = 3000;
+/// Files of a run that stay with it at most, as v1::ProgramRun has them.
+constexpr std::size_t kMostKept = 64;
 /// What {NAME} stands for in every command and template.
 constexpr std::array kReserved = {"scratch", "threads", "seed"};
 
@@ -252,6 +254,28 @@ void CheckNumerics(const MapReader& campaign_map, const Campaign& campaign,
   }
 }
 
+// Names of files of the scratch folder.
+std::vector<std::string> ReadKeep(MapReader& model) {
+  std::vector<std::string> names = model.TextList("keep").value_or(std::vector<std::string>{});
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    const std::filesystem::path path(name);
+    if (name.empty() || path.is_absolute() || path.lexically_normal() != path ||
+        *path.begin() == ".." || path.filename().empty()) {
+      model.Problem("keep", absl::StrCat(Quoted(name),
+                                         " is no name of a file of the scratch "
+                                         "folder: dump.vtk, out/dump.vtk"));
+    } else if (!seen.insert(name).second) {
+      model.Problem("keep", absl::StrCat(Quoted(name), " stands here twice; keep one"));
+    }
+  }
+  if (names.size() > kMostKept) {
+    model.Problem("keep", absl::StrCat("names ", names.size(), " files, and a run keeps ",
+                                       kMostKept, "; let the program pack them"));
+  }
+  return names;
+}
+
 }  // namespace
 
 bool NamesProgram(const MapReader& model) { return model.Has("command"); }
@@ -269,7 +293,7 @@ void ReadProgram(MapReader& model, ReadContext& context, Campaign& campaign) {
   FilesReader files(model, context, program);
   files.Read("files", false);
   files.Read("templates", true);
-  program.keep = model.TextList("keep").value_or(std::vector<std::string>{});
+  program.keep = ReadKeep(model);
   program.checkpoint = model.TrueOrFalse("checkpoint").value_or(false);
   program.persistent = model.TrueOrFalse("persistent").value_or(false);
   program.states = ReadStatesTable(model);
