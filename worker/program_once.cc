@@ -19,6 +19,8 @@ namespace {
 std::string ReportText(const ProgramReport& report, const v1::Finished& finished) {
   nlohmann::json kept = nlohmann::json::array();
   for (const auto& file : report.kept) kept.push_back(file.name);
+  nlohmann::json not_kept = nlohmann::json::array();
+  for (const auto& [name, why] : report.not_kept) not_kept.push_back(absl::StrCat(name, " ", why));
   const nlohmann::json json = {{"request", report.request},
                                {"ignored_lines", report.ignored_lines},
                                {"ignored", report.ignored},
@@ -28,7 +30,7 @@ std::string ReportText(const ProgramReport& report, const v1::Finished& finished
                                {"all_at_once", report.all_at_once},
                                {"words", report.words},
                                {"kept", kept},
-                               {"not_kept", report.not_kept}};
+                               {"not_kept", not_kept}};
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -6,6 +6,8 @@
 
 #include <condition_variable>
 #include <deque>
+#include <functional>
+#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -136,6 +138,11 @@ struct ServerLink::Impl {
     return stub;
   }
 
+  absl::StatusOr<std::shared_ptr<v1::WorkerLink::Stub>> OpenStub() {
+    absl::MutexLock lock(&mutex);
+    return Connection();
+  }
+
   const std::string address;
   const rpc::AccessChoice choice;
   absl::Mutex mutex;
@@ -196,42 +203,71 @@ bool ServerLink::HasMoreToShow() {
   return now.ok() && *now != impl_->shown;
 }
 
-absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::stop_token stop) {
+namespace {
+
+/// Of a content that is to be stored: the server may be out of room for long, or take none as
+/// large.
+constexpr int kMostRefusals = 5;
+
+/// Calls until an answer will not change, or `stop`; not more often than `most_refusals` where the
+/// server has no room. call: one try, its status that of gRPC.
+absl::Status Insist(const std::stop_token& stop, int most_refusals,
+                    const std::function<absl::Status(grpc::ClientContext&)>& call) {
   rpc::Backoff backoff({});
-  while (true) {
+  for (int refusals = 0;;) {
     grpc::ClientContext context;
     rpc::SetDeadline(context, rpc::kBlobDeadline);
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
-    v1::BlobRequest request;
-    request.set_digest(digest);
-    std::shared_ptr<v1::WorkerLink::Stub> stub;
-    {
-      absl::MutexLock lock(&impl_->mutex);
-      ASSIGN_OR_RETURN(stub, impl_->Connection());
-    }
-    const auto reader = stub->GetBlob(&context, request);
-    rpc::BlobAssembler assembler;
-    v1::BlobChunk chunk;
-    absl::Status assembled;
-    while (assembled.ok() && reader->Read(&chunk)) {
-      assembled = rpc::CheckMessage(chunk);
-      if (assembled.ok()) assembled = assembler.Add(chunk);
-    }
-    if (!assembled.ok()) {
-      context.TryCancel();
-      return assembled;
-    }
-    const absl::Status status = rpc::FromGrpc(reader->Finish());
-    if (status.ok()) {
-      return assembler.Finish();
-    }
-    if (stop.stop_requested() || !rpc::IsRetryable(status.code())) {
+    absl::Status status = call(context);
+    refusals += absl::IsResourceExhausted(status) ? 1 : 0;
+    if (status.ok() || stop.stop_requested() || !rpc::IsRetryable(status.code()) ||
+        refusals >= most_refusals)
       return status;
-    }
     std::mutex mutex;
     std::unique_lock<std::mutex> lock(mutex);
     std::condition_variable_any().wait_for(lock, stop, backoff.Next(), [] { return false; });
   }
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::stop_token stop) {
+  v1::BlobRequest request;
+  request.set_digest(digest);
+  std::string content;
+  RETURN_IF_ERROR(Insist(stop, std::numeric_limits<int>::max(),
+                         [&](grpc::ClientContext& context) -> absl::Status {
+                           ASSIGN_OR_RETURN(const auto stub, impl_->OpenStub());
+                           const auto reader = stub->GetBlob(&context, request);
+                           rpc::BlobAssembler assembler;
+                           v1::BlobChunk chunk;
+                           absl::Status assembled;
+                           while (assembled.ok() && reader->Read(&chunk)) {
+                             assembled = rpc::CheckMessage(chunk);
+                             if (assembled.ok()) assembled = assembler.Add(chunk);
+                           }
+                           if (!assembled.ok()) {
+                             context.TryCancel();
+                             return assembled;
+                           }
+                           RETURN_IF_ERROR(rpc::FromGrpc(reader->Finish()));
+                           ASSIGN_OR_RETURN(content, assembler.Finish());
+                           return absl::OkStatus();
+                         }));
+  return content;
+}
+
+absl::Status ServerLink::PutBlob(const std::string& content, std::stop_token stop) {
+  return Insist(stop, kMostRefusals, [&](grpc::ClientContext& context) -> absl::Status {
+    ASSIGN_OR_RETURN(const auto stub, impl_->OpenStub());
+    v1::BlobReceipt receipt;
+    const auto writer = stub->PutBlob(&context, &receipt);
+    for (const v1::BlobChunk& chunk : rpc::ToChunks(content)) {
+      if (!writer->Write(chunk)) break;  // Finish() says why
+    }
+    writer->WritesDone();
+    return rpc::FromGrpc(writer->Finish());
+  });
 }
 
 }  // namespace calib::worker

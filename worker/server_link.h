@@ -45,6 +45,8 @@ class ServerLink {
 
   /// Content by digest: waits, with retries while the server is away, until it is there or `stop`.
   absl::StatusOr<std::string> GetBlob(const std::string& digest, std::stop_token stop);
+  /// Stores content; waits as GetBlob. Errors: why the server does not take it.
+  absl::Status PutBlob(const std::string& content, std::stop_token stop);
 
  private:
   class Stream;

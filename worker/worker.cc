@@ -65,6 +65,10 @@ class Worker::Impl {
                        [this](const std::string& digest, std::stop_token stop) {
                          return link_.GetBlob(digest, std::move(stop));
                        },
+                   .put =
+                       [this](const std::string& content, std::stop_token stop) {
+                         return link_.PutBlob(content, std::move(stop));
+                       },
                    .scratch = options_.scratch,
                    .allowed = options_.allowed_commands,
                    .slots = options_.slots}) {}

@@ -27,6 +27,7 @@ namespace calib::ctl {
   VERB(Report)            \
   VERB(Export)            \
   VERB(Vtk)               \
+  VERB(Kept)              \
   VERB(Pause)             \
   VERB(Resume)            \
   VERB(Cancel)            \

@@ -80,6 +80,13 @@ struct EffectAnswer {
   std::map<std::string, double> angles{};  ///< to the others, degrees
 };
 
+/// What a setting changes that should not matter.
+struct NumericalChange {
+  std::string name{};          ///< as a design calls it
+  double null = 0, tried = 0;  ///< SI
+  double rms = 0;              ///< of the change, in sd of a measurement
+};
+
 struct NamedFamily {
   std::vector<std::string> effects{};
   double probability = 0;
@@ -110,6 +117,7 @@ struct Answer {
   /// Of another campaign's design and its base, which they rest on; or with effects, of tables of
   /// runs made elsewhere.
   int borrowed_runs = 0;
+  std::vector<NumericalChange> numerics{};  ///< whose runs came to their ends
   std::vector<std::string> warnings{};
   std::string sentence{};  ///< the verdict in words
 };

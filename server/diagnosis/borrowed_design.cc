@@ -48,7 +48,7 @@ std::string WhyOtherParameters(const campaign::Campaign& campaign,
   for (const campaign::CalibratedParameter& other : design.parameters) {
     const std::string effect = campaign::EffectNamedIn(other.name);
     const bool of_design =
-        effect == campaign::kNumerics ||
+        campaign::IsNumerics(design, other.name) ||
         std::find(design.race.begin(), design.race.end(), effect) != design.race.end();
     const bool of_campaign =
         std::any_of(campaign.parameters.begin(), campaign.parameters.end(),

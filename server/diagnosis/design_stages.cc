@@ -262,6 +262,13 @@ absl::StatusOr<Answer> DesignChain::AnswerAfter(std::size_t n,
   for (std::size_t i = borrowed_; i < n; ++i)
     answer.runs[campaign::ToString(batches_[i].stage)] += static_cast<int>(batches_[i].runs.size());
   answer.borrowed_runs = RunsIn(0, borrowed_);
+  for (const auto& [c, change] : ChangesByNumerics(before_.base, scout_rows_, batches_)) {
+    const NumericalChoice& choice = race().numerics[static_cast<std::size_t>(c)];
+    answer.numerics.push_back({.name = choice.name,
+                               .null = choice.null,
+                               .tried = choice.tried,
+                               .rms = RmsOf(before_.base, change.transpose())});
+  }
   return answer;
 }
 

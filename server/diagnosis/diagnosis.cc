@@ -70,8 +70,7 @@ class Inquiry {
     }
     NameUnits();
     if (options_.next_experiment && !options_.then && !options_.only_adequacy &&
-        campaign::HasOwnEngine(view_.campaign) &&
-        diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
+        !view_.campaign.precomputed && diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
       const absl::Status planned = PlanNext();
       if (absl::IsCancelled(planned)) return planned;
       if (!planned.ok()) {
@@ -108,7 +107,7 @@ class Inquiry {
   }
 
   absl::Status TellMeasurement(const MadeMeasurement& made) {
-    if (options_.only_adequacy || !campaign::HasOwnEngine(view_.campaign)) {
+    if (options_.only_adequacy || view_.campaign.precomputed) {
       return absl::FailedPreconditionError(
           "a further measurement is told by runs of its test, and here none are made");
     }

@@ -100,6 +100,15 @@ Json CurvesJson(const EffectAnswer& own) {
   return json;
 }
 
+Json NumericsJson(const Answer& answer) {
+  Json json = Json::array();
+  for (const NumericalChange& own : answer.numerics) {
+    json.push_back(
+        {{"name", own.name}, {"null", own.null}, {"tried", own.tried}, {"rms", own.rms}});
+  }
+  return json;
+}
+
 Json CandidateJson(const Answer& answer, const EffectAnswer& own) {
   const bool first = &own == &answer.candidates.front();
   return {{"effect", own.effect},
@@ -164,6 +173,8 @@ std::string NextText(const NextExperiment& next) {
     text += "  " + InWords(planned) + ": ";
     if (planned.forecast) {
       text += ForecastInWords(*planned.forecast) + "\n";
+    } else if (planned.of_next) {
+      text += "not known\n";
     } else {
       text += planned.expected_power < kToldApart
                   ? "at first sight tells none of them apart\n"
@@ -281,6 +292,17 @@ std::string DetectableText(const Diagnosis& d) {
   return text;
 }
 
+std::string NumericsText(const Answer& answer) {
+  std::string text;
+  for (const NumericalChange& own : answer.numerics) {
+    text += fmt::format("  {} from {} to {}: {} sd\n", own.name, Number(own.null, 3),
+                        Number(own.tried, 3), Number(own.rms, 2));
+  }
+  return text.empty()
+             ? text
+             : "\nWhat should not matter moves the curves by, in sd of a measurement:\n" + text;
+}
+
 std::string RunsText(const Diagnosis& d) {
   if (d.design.empty()) {
     return d.answer.borrowed_runs == 0
@@ -361,6 +383,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
     } else if (d.design.empty()) {
       json["design"]["held_runs"] = answer.borrowed_runs;
     }
+    json["numerics"] = NumericsJson(answer);
     json["without"] = d.left_out;
     json["then"] = ThenJson(d.then);
   }
@@ -385,7 +408,7 @@ std::string DiagnosisText(const Diagnosis& d) {
                                           report::StrengthInWords(own.amplitude, d.units)),
                               "", "  ");
     }
-    text += DetectableText(d);
+    text += DetectableText(d) + NumericsText(answer);
   }
   text += ByReason("Not tried, because", answer.not_excitable);
   if (d.next_experiment) text += NextText(*d.next_experiment);

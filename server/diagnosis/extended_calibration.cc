@@ -73,8 +73,7 @@ std::map<std::string, double> ValuesInExtension(const PriorsInExtension& priors,
   for (std::size_t j = 0; j < design.parameters.size(); ++j) {
     const std::string& name = design.parameters[j].name;
     const double value = sample.parameters(static_cast<int>(j));
-    if (campaign::FindNumerics(name) != nullptr && value != campaign::NullOf(design, name))
-      return {};
+    if (campaign::IsNumerics(design, name) && value != campaign::NullOf(design, name)) return {};
     if (priors.Has(name)) values[name] = value;
   }
   return values;

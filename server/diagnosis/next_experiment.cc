@@ -13,6 +13,7 @@
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/plan_words.h"
+#include "server/diagnosis/program_plans.h"
 #include "server/diagnosis/proposed_runs.h"
 #include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/setting_plans.h"
@@ -70,14 +71,14 @@ class Choice {
       plan_.why_none = "one model is certain, and there are no two to tell apart";
       return std::move(plan_);
     }
-    ASSIGN_OR_RETURN(PlanScreen screen, ScreenPlans(laboratory_, question.rivals, question.none,
-                                                    question.like, question.scatter));
+    ASSIGN_OR_RETURN(PlanScreen screen, Screen(question));
     evaluations_ = screen.evaluations;
     if (!screen.warning.empty()) plan_.warnings.push_back(screen.warning + ".");
     Repeats();
     for (std::size_t i = 0; i < screen.plans.size(); ++i) {
       ScreenedPlan& one = screen.plans[i];
-      if (i < kPlansWithRuns) RETURN_IF_ERROR(Run(one));
+      if (IsOfProgram() || i < kPlansWithRuns) RETURN_IF_ERROR(Run(one));
+      if (IsOfProgram()) one.separates = LeadingNames();
       proposals_.push_back({.experiment = std::move(one.experiment),
                             .separates = std::move(one.separates),
                             .entry = std::move(one.entry)});
@@ -105,6 +106,14 @@ class Choice {
   }
 
  private:
+  bool IsOfProgram() const { return base_.campaign.program.has_value(); }
+
+  absl::StatusOr<PlanScreen> Screen(const ScreenQuestion& question) {
+    if (IsOfProgram()) return PlansOfProgram(laboratory_, base_, question.like);
+    return ScreenPlans(laboratory_, question.rivals, question.none, question.like,
+                       question.scatter);
+  }
+
   // Names of the leading models.
   std::vector<std::string> LeadingNames() const {
     std::vector<std::string> names;
@@ -138,18 +147,19 @@ class Choice {
     return ForecastOf(answered_, {.set = test.known.set.get(), .measured = test.known.z});
   }
 
-  // One whose test by itself cannot be learnt is left out.
+  // One whose test by itself cannot be learnt is left out, and what a program would only run again.
   void Repeats() {
     for (const campaign::Experiment& experiment : base_.campaign.experiments) {
-      if (experiment.role != campaign::Role::kCalibrate) continue;
-      const auto original =
-          EntryNamed(base_.source.campaign_file(), base_.campaign, experiment.name);
-      if (!original) continue;
+      if (experiment.role != campaign::Role::kCalibrate ||
+          (IsOfProgram() && experiment.specimens.size() < 2))
+        continue;
       Proposal repeat{.experiment = RepeatOf(experiment), .separates = LeadingNames(), .entry = {}};
       const std::string name = experiment.name + "_again";
-      repeat.entry =
-          EntryFor({.experiment = AsMeasured(experiment), .name = name, .file = name + ".csv"},
-                   experiment, *original, base_.campaign);
+      const auto entry = EntryOfPlan(
+          base_, {.experiment = AsMeasured(experiment), .name = name, .file = name + ".csv"},
+          experiment);
+      if (!entry) continue;
+      repeat.entry = *entry;
       const auto forecast = ForecastOfRepeat(experiment.name);
       if (!forecast.ok()) {
         plan_.warnings.push_back(
@@ -211,6 +221,7 @@ class Choice {
 PlannedExperiment RepeatOf(const campaign::Experiment& experiment) {
   PlannedExperiment planned = AsMeasured(experiment);
   planned.settings = experiment.settings;
+  planned.told = experiment.told;
   planned.repeats = experiment.name;
   return planned;
 }

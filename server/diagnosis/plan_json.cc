@@ -11,6 +11,13 @@ nlohmann::json NumberOrNull(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
 }
 
+// What a program is told stands beside what a catalogue knows.
+nlohmann::json SettingsJson(const PlannedExperiment& planned) {
+  nlohmann::json settings = planned.settings;
+  for (const auto& [name, value] : planned.told) settings[name] = nlohmann::json::parse(value);
+  return settings;
+}
+
 nlohmann::json ForecastJson(const std::optional<PlanForecast>& forecast) {
   if (!forecast) return nullptr;
   return {{"decides", forecast->decides},
@@ -26,7 +33,8 @@ nlohmann::json PlannedJson(const PlannedExperiment& planned) {
   return {{"test", planned.test},
           {"repeat_of", planned.repeats.empty() ? json(nullptr) : json(planned.repeats)},
           {"in_words", InWords(planned)},
-          {"settings", planned.settings},
+          {"of_next", planned.of_next},
+          {"settings", SettingsJson(planned)},
           {"unloading", planned.unloading_at.has_value()},
           {"unloading_at", NumberOrNull(planned.unloading_at)},
           {"control", planned.control},
@@ -50,7 +58,14 @@ absl::StatusOr<PlannedExperiment> PlannedFrom(const nlohmann::json& json) {
   PlannedExperiment planned;
   try {
     planned.test = json.at("test");
-    planned.settings = json.at("settings").get<std::map<std::string, double>>();
+    planned.of_next = json.value("of_next", false);
+    for (const auto& [name, value] : json.at("settings").items()) {
+      if (planned.of_next || !value.is_number()) {
+        planned.told[name] = value.dump();
+      } else {
+        planned.settings[name] = value;
+      }
+    }
     planned.control = json.at("control");
     planned.path = json.at("path").get<std::vector<double>>();
     const nlohmann::json& unloading = json.at("unloading_at");

@@ -38,31 +38,6 @@ double ErrorAt(const campaign::MeasuredObservable& observable, double value) {
   return observable.sd[static_cast<std::size_t>(nearest)];
 }
 
-// Curves of one run, [observable][reading]; empty: it did not finish.
-std::vector<Eigen::VectorXd> CurvesOf(const report::CampaignView& view, const std::string& name,
-                                      int sample, const campaign::Experiment& pattern,
-                                      Index readings) {
-  const auto found = view.states.find({name, sample});
-  if (found == view.states.end() || static_cast<Index>(found->second.states.size()) < readings) {
-    return {};
-  }
-  std::vector<Eigen::VectorXd> curves;
-  for (const campaign::MeasuredObservable& o : pattern.observables) {
-    const auto& names = found->second.observables;
-    const auto at = std::find(names.begin(), names.end(), o.name);
-    if (at == names.end()) return {};
-    Eigen::VectorXd& curve = curves.emplace_back(
-        Eigen::VectorXd::Constant(readings, std::numeric_limits<double>::quiet_NaN()));
-    for (const v1::State& state : found->second.states) {
-      if (state.load_step() < readings) {
-        curve[state.load_step()] = state.values(static_cast<int>(at - names.begin()));
-      }
-    }
-    if (!curve.allFinite()) return {};
-  }
-  return curves;
-}
-
 // Differences of two runs over the noise, curve by curve.
 std::vector<Eigen::VectorXd> DeparturesOf(const std::vector<Eigen::VectorXd>& a,
                                           const std::vector<Eigen::VectorXd>& b,
@@ -371,6 +346,30 @@ class Planning {
 };
 
 }  // namespace
+
+std::vector<Eigen::VectorXd> CurvesOf(const report::CampaignView& view, const std::string& name,
+                                      int sample, const campaign::Experiment& pattern,
+                                      Index readings) {
+  const auto found = view.states.find({name, sample});
+  if (found == view.states.end() || static_cast<Index>(found->second.states.size()) < readings) {
+    return {};
+  }
+  std::vector<Eigen::VectorXd> curves;
+  for (const campaign::MeasuredObservable& o : pattern.observables) {
+    const auto& names = found->second.observables;
+    const auto at = std::find(names.begin(), names.end(), o.name);
+    if (at == names.end()) return {};
+    Eigen::VectorXd& curve = curves.emplace_back(
+        Eigen::VectorXd::Constant(readings, std::numeric_limits<double>::quiet_NaN()));
+    for (const v1::State& state : found->second.states) {
+      if (state.load_step() < readings) {
+        curve[state.load_step()] = state.values(static_cast<int>(at - names.begin()));
+      }
+    }
+    if (!curve.allFinite()) return {};
+  }
+  return curves;
+}
 
 double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
                     const std::vector<double>& shift) {

@@ -28,6 +28,12 @@ struct Rival {
   std::map<std::string, dem::DefaultPrior> parameters{};
 };
 
+/// Curves of a run of an experiment, [observable of the pattern][reading]; empty: it did not
+/// finish.
+std::vector<Eigen::VectorXd> CurvesOf(const report::CampaignView& view, const std::string& name,
+                                      int sample, const campaign::Experiment& pattern,
+                                      Eigen::Index readings);
+
 /// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
 /// what a measurement and both runs scatter by; 0 where it is no more. departures: per curve, the
 /// difference of the runs over the noise. scatter s of a single run in units of the noise: half of

@@ -10,17 +10,20 @@
 namespace calib::diagnosis {
 namespace {
 
-std::string UnitOf(const std::string& quantity, const dem::TestInfo& test) {
+// SI, as far as the catalogue knows the quantity.
+std::string UnitOf(const std::string& quantity, const dem::TestInfo* test) {
   if (quantity == "loading_rate") return "1/s";
-  for (const dem::ParameterInfo& setting : test.settings) {
-    if (setting.name == quantity) return setting.unit;
+  if (test != nullptr) {
+    for (const dem::ParameterInfo& setting : test->settings) {
+      if (setting.name == quantity) return setting.unit;
+    }
   }
   const dem::ObservableInfo* const observable = dem::FindObservable(quantity);
   return observable != nullptr ? observable->unit : "1";
 }
 
 std::string Quantity(const PlannedExperiment& planned, const std::string& name, double value) {
-  return report::NumberWithUnit(value, name, UnitOf(name, *dem::FindTest(planned.test)), 3);
+  return report::NumberWithUnit(value, name, UnitOf(name, dem::FindTest(planned.test)), 3);
 }
 
 }  // namespace
@@ -31,6 +34,11 @@ std::string InWords(const PlannedExperiment& planned) {
   std::string text = planned.test;
   for (const auto& [name, value] : planned.settings) {
     text += fmt::format(", {} {}", report::NameForPeople(name), Quantity(planned, name, value));
+  }
+  if (planned.of_next) {
+    for (const auto& [name, value] : planned.told) {
+      text += fmt::format(", {} {}", report::NameForPeople(name), value);
+    }
   }
   if (planned.control != "axial_strain") {
     text += fmt::format(", driven by {} from {} to {}", report::NameForPeople(planned.control),
@@ -46,8 +54,8 @@ std::string WayInWords(const PlannedExperiment& planned) {
   const std::vector<double>& path = planned.path;
   const auto value = [&](double of) { return Quantity(planned, planned.control, of); };
   std::string text = report::NameForPeople(planned.control);
-  const dem::TestInfo& test = *dem::FindTest(planned.test);
-  if (test.separate_points || !test.needs_packing) {
+  const dem::TestInfo* test = dem::FindTest(planned.test);
+  if (test != nullptr && (test->separate_points || !test->needs_packing)) {
     return text + fmt::format(" at {} values from {} to {}", path.size(), value(path.front()),
                               value(path.back()));
   }

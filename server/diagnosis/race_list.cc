@@ -171,7 +171,20 @@ absl::Status NobodyIn(const campaign::Campaign& campaign, const Race& race) {
                    absl::StrJoin(reasons, ", ")));
 }
 
+// By one sd, in the units of which the amplitude of what they change is normal.
+std::vector<NumericalChoice> NumericsOfProgram(const campaign::Program& program) {
+  std::vector<NumericalChoice> choices;
+  for (const auto& [name, choice] : program.numerics) {
+    choices.push_back({.name = absl::StrCat(campaign::kNumerics, ".", name),
+                       .null = choice.null,
+                       .tried = choice.null + choice.sd});
+  }
+  return choices;
+}
+
 std::vector<NumericalChoice> NumericsOf(const campaign::Campaign& campaign) {
+  if (campaign.precomputed) return {};
+  if (campaign.program) return NumericsOfProgram(*campaign.program);
   const bool staged = std::any_of(
       campaign.experiments.begin(), campaign.experiments.end(), [](const auto& experiment) {
         return experiment.role == campaign::Role::kCalibrate && campaign::ReadAtRest(experiment);
@@ -288,8 +301,6 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
         race.excluded.emplace_back(a, b);
     }
   }
-  // Where the runs were made elsewhere there is no engine whose choices matter.
-  if (elsewhere) return race;
   race.numerics = NumericsOf(campaign);
   return race;
 }

@@ -69,7 +69,7 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 /// Who can join the model of a calibrated campaign and be seen in its fitted experiments. without:
 /// effects that are left out as asked for. Where the runs were made elsewhere: effects that their
 /// rows hold, the strengths that EffectsOnReadings calculates, without shapes, which it holds, and
-/// no numerics. Errors:
+/// no numerics; those of a program are the ones that it declares, tried one sd off. Errors:
 /// FAILED_PRECONDITION with a sentence where nobody can.
 absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
                             const std::vector<std::string>& without);

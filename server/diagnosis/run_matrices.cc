@@ -47,36 +47,10 @@ DesignRuns RunsOfDesign(const DesignRows& rows, const std::vector<EndedBatch>& b
   return runs;
 }
 
-// What numerical choices change, a column each, where both runs of a pair came to their ends.
+// What numerical choices change, a column each.
 Eigen::MatrixXd StagingOf(const BaseRuns& base, const DesignRows& rows,
                           const std::vector<EndedBatch>& batches) {
-  std::map<int, Eigen::VectorXd> change;  // by choice, the first that came
-  const Index d = base.values.cols();
-  // The same run with unchanged numerics, scaled; nothing: there is none.
-  const auto unchanged = [&](const campaign::RunOf& run) -> std::optional<Eigen::RowVectorXd> {
-    const Eigen::RowVectorXd own = Eigen::Map<const Eigen::RowVectorXd>(run.values.data(), d);
-    for (Index i = 0; i < base.values.rows(); ++i) {
-      if (base.stream[static_cast<std::size_t>(i)] == run.stream && base.values.row(i) == own)
-        return base.histories.row(i);
-    }
-    const std::vector<double> values = rows.WithoutNumerics(run.values);
-    for (const EndedBatch& batch : batches) {
-      for (const EndedRun& ended : batch.runs) {
-        if (ended.readings && ended.run.stream == run.stream && ended.run.values == values)
-          return base.scale.Scaled(*ended.readings);
-      }
-    }
-    return std::nullopt;
-  };
-  for (const EndedBatch& batch : batches) {
-    for (const EndedRun& ended : batch.runs) {
-      const int choice = rows.ChangedNumerics(ended.run.values);
-      if (choice < 0 || !ended.readings) continue;
-      const std::optional<Eigen::RowVectorXd> without = unchanged(ended.run);
-      if (without)
-        change.emplace(choice, (base.scale.Scaled(*ended.readings) - *without).transpose());
-    }
-  }
+  const std::map<int, Eigen::VectorXd> change = ChangesByNumerics(base, rows, batches);
   Eigen::MatrixXd staging(base.histories.cols(), static_cast<Index>(change.size()));
   Index column = 0;
   for (const auto& [choice, difference] : change) staging.col(column++) = difference;
@@ -207,6 +181,38 @@ std::vector<Index> ColumnsOfExperiment(const HistoryScale& scale, const std::str
 }
 
 }  // namespace
+
+std::map<int, Eigen::VectorXd> ChangesByNumerics(const BaseRuns& base, const DesignRows& rows,
+                                                 const std::vector<EndedBatch>& batches) {
+  std::map<int, Eigen::VectorXd> change;  // by choice, the first that came
+  const Index d = base.values.cols();
+  // The same run with unchanged numerics, scaled; nothing: there is none.
+  const auto unchanged = [&](const campaign::RunOf& run) -> std::optional<Eigen::RowVectorXd> {
+    const Eigen::RowVectorXd own = Eigen::Map<const Eigen::RowVectorXd>(run.values.data(), d);
+    for (Index i = 0; i < base.values.rows(); ++i) {
+      if (base.stream[static_cast<std::size_t>(i)] == run.stream && base.values.row(i) == own)
+        return base.histories.row(i);
+    }
+    const std::vector<double> values = rows.WithoutNumerics(run.values);
+    for (const EndedBatch& batch : batches) {
+      for (const EndedRun& ended : batch.runs) {
+        if (ended.readings && ended.run.stream == run.stream && ended.run.values == values)
+          return base.scale.Scaled(*ended.readings);
+      }
+    }
+    return std::nullopt;
+  };
+  for (const EndedBatch& batch : batches) {
+    for (const EndedRun& ended : batch.runs) {
+      const int choice = rows.ChangedNumerics(ended.run.values);
+      if (choice < 0 || !ended.readings) continue;
+      const std::optional<Eigen::RowVectorXd> without = unchanged(ended.run);
+      if (without)
+        change.emplace(choice, (base.scale.Scaled(*ended.readings) - *without).transpose());
+    }
+  }
+  return change;
+}
 
 int PackingsApart(const campaign::Campaign& campaign) {
   int packings = 0;

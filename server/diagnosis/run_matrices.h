@@ -94,6 +94,11 @@ std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries);
 inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
                              const std::vector<EndedBatch>& batches, const PartOfRace& part);
 
+/// What each numerical choice changes of a history (HistoryScale::Scaled), by its number: the first
+/// run with it against the same run without, where both came to their ends.
+std::map<int, Eigen::VectorXd> ChangesByNumerics(const BaseRuns& base, const DesignRows& rows,
+                                                 const std::vector<EndedBatch>& batches);
+
 /// The columns of one experiment (HistoryScale::names) of these runs.
 inference::SetRuns OfExperiment(const inference::SetRuns& runs, const HistoryScale& scale,
                                 const std::string& experiment);

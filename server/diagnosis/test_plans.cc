@@ -25,26 +25,6 @@ constexpr double kOedometricStrain = 0.03;
 constexpr double kDensity = 0.02;  // in porosity
 constexpr double kEarly = 0.2;     // of the way, an unloading before most of the deformation
 
-// Over which the errors of a covariance fall to 1/e, along neighbouring readings; 0: independent.
-double CorrelationLength(const std::vector<double>& control,
-                         const campaign::MeasuredObservable& observable) {
-  const Eigen::MatrixXd& c = observable.covariance;
-  if (c.rows() == 0) return observable.correlation_length;
-  double decay = 0;
-  double way = 0;
-  const std::vector<Eigen::Index> rows = campaign::RowsRead(observable);
-  for (std::size_t k = 1; k < rows.size(); ++k) {
-    const Eigen::Index i = rows[k];
-    const Eigen::Index before = rows[k - 1];
-    const double correlation = c(i, before) / std::sqrt(c(i, i) * c(before, before));
-    if (!(correlation > 0)) return 0;
-    decay -= std::log(std::min(1.0, correlation));
-    way +=
-        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(before)]);
-  }
-  return decay > 0 ? way / decay : 0;
-}
-
 // Looser and denser specimens than the pattern's, where they are generated.
 std::vector<double> OtherPorosities(const campaign::Experiment& pattern) {
   const auto* recipe = pattern.specimens.empty()
@@ -272,16 +252,11 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
                              campaign::YamlFind(*inner, "covariance") == nullptr)) {
       continue;
     }
-    double sum = 0;
-    const std::vector<Eigen::Index> rows = campaign::RowsRead(o);
-    for (const Eigen::Index row : rows) {
-      sum += o.sd[static_cast<std::size_t>(row)] / static_cast<double>(rows.size());
-    }
     YamlNode& mean = campaign::YamlAt(campaign::YamlAt(observables, o.name), "noise");
     campaign::YamlErase(mean, "column");
     campaign::YamlErase(mean, "covariance");
-    campaign::YamlAt(mean, "absolute") = campaign::YamlNumber(sum);
-    const double length = CorrelationLength(pattern.control, o);
+    campaign::YamlAt(mean, "absolute") = campaign::YamlNumber(*campaign::LawOf(o).absolute);
+    const double length = campaign::CorrelationLengthOf(pattern.control, o);
     if (length > 0) campaign::YamlAt(mean, "correlation_length") = campaign::YamlNumber(length);
   }
   return entry;

@@ -39,6 +39,9 @@ struct PlannedExperiment {
   /// By runs of its own; then expected_power is its `decides`.
   std::optional<PlanForecast> forecast{};
   std::string repeats{};  ///< experiment of the campaign that it is, on another specimen; or empty
+  /// One of Campaign::next, which `test` names; `told` are its settings then.
+  bool of_next = false;
+  campaign::ProgramSettings told{};
 };
 
 struct TestPlan {

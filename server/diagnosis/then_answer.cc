@@ -12,6 +12,7 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
 #include "server/diagnosis/plan_words.h"
+#include "server/diagnosis/program_plans.h"
 #include "server/diagnosis/proposed_runs.h"
 #include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/setting_plans.h"
@@ -104,18 +105,29 @@ class SecondInquiry {
         absl::StrCat(made_.file, " is not the proposed test (", InWords(made_.plan), "): ", why));
   }
 
+  // What the measurement follows in everything that its plan does not change; nullptr: there is no
+  // such test.
+  const campaign::Experiment* Followed() const {
+    const campaign::Campaign& campaign = base_.campaign;
+    if (!made_.plan.of_next && made_.plan.repeats.empty()) return &PatternOf(campaign);
+    const auto& list = made_.plan.of_next ? campaign.next : campaign.experiments;
+    const std::string& name = made_.plan.of_next ? made_.plan.test : made_.plan.repeats;
+    const auto found = std::find_if(list.begin(), list.end(),
+                                    [&name](const auto& one) { return one.name == name; });
+    return found == list.end() ? nullptr : &*found;
+  }
+
   absl::Status ReadFile() {
-    const bool repeats = !made_.plan.repeats.empty();
-    const campaign::Experiment& pattern =
-        repeats ? ExperimentNamed(base_.campaign, made_.plan.repeats) : PatternOf(base_.campaign);
-    const auto original = EntryNamed(base_.source.campaign_file(), base_.campaign, pattern.name);
-    if (!original) return absl::InternalError("the pattern has no entry in the campaign file");
+    const campaign::Experiment* pattern = Followed();
+    if (pattern == nullptr) return NotPlanned("the campaign file names it no more");
     PlannedExperiment changed = made_.plan;
-    if (repeats) changed = AsMeasured(pattern);
-    test_ = {.entry = EntryFor({.experiment = changed, .name = "next", .file = made_.file}, pattern,
-                               *original, base_.campaign),
-             .file = made_.file,
-             .data = made_.content};
+    if (!made_.plan.repeats.empty()) changed = AsMeasured(*pattern);
+    // A program may go by the name of an experiment.
+    const std::string name = base_.campaign.program ? pattern->name : "next";
+    auto entry =
+        EntryOfPlan(base_, {.experiment = changed, .name = name, .file = made_.file}, *pattern);
+    if (!entry) return absl::InternalError("the pattern has no entry in the campaign file");
+    test_ = {.entry = *std::move(entry), .file = made_.file, .data = made_.content};
     ASSIGN_OR_RETURN(
         const std::string text,
         campaign::Derive(

@@ -204,6 +204,7 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
   message.set_limit_diverges(program.limit_diverges);
   message.set_version(program.version);
   message.set_experiment(measured.name);
+  message.set_test(measured.test);
   const auto realization = static_cast<std::size_t>(run.stream) % measured.specimens.size();
   message.set_realization(static_cast<int>(realization));
   dem::Model model = campaign::ModelOf(campaign, measured, run.values);
@@ -217,6 +218,9 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
            !IsDeclared(campaign, effect);
   });
   message.mutable_parameters()->insert(model.parameters.begin(), model.parameters.end());
+  for (const auto& [name, value] : campaign::NumericsOf(campaign, run.values)) {
+    (*message.mutable_parameters())[name] = value;
+  }
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     if (model.parameters.contains(parameter.name)) {
       (*message.mutable_units())[parameter.name] = parameter.unit;

@@ -376,6 +376,10 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
 }
 
 store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, AttemptOutcome outcome) {
+  std::vector<store::KeptFile> kept;
+  for (const v1::KeptFile& file : finished.kept()) {
+    kept.push_back({.name = file.name(), .digest = file.digest(), .reason = file.reason()});
+  }
   return {.id = finished.attempt(),
           .outcome = outcome,
           .reason = finished.reason(),
@@ -384,7 +388,8 @@ store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, AttemptOutco
           .contact_updates = finished.contact_updates(),
           .core_seconds = finished.core_seconds(),
           .staging = finished.staging(),
-          .words = finished.words()};
+          .words = finished.words(),
+          .kept = std::move(kept)};
 }
 
 void Scheduler::Rest(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished,

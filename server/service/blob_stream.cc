@@ -103,10 +103,10 @@ grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core,
 
 grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core,
                                                     const grpc::ServerContextBase& context,
-                                                    const std::string& folder,
+                                                    Right right, const std::string& folder,
                                                     v1::BlobReceipt* receipt) {
   using Reactor = grpc::ServerReadReactor<v1::BlobChunk>;
-  auto entry = AdmitWithBlob(core, context, Right::kChange, nullptr);
+  auto entry = AdmitWithBlob(core, context, right, nullptr);
   if (!entry.ok()) {
     return new EndedCall<Reactor>(entry.status());
   }

@@ -18,10 +18,11 @@ grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core,
                                                   const google::protobuf::Message& request,
                                                   const std::string& digest);
 
-/// Stores what arrives under its digest, which is checked. It waits in `folder` until it is whole.
+/// Stores what arrives from who has the right under its digest, which is checked. It waits in
+/// `folder` until it is whole.
 grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core,
                                                     const grpc::ServerContextBase& context,
-                                                    const std::string& folder,
+                                                    Right right, const std::string& folder,
                                                     v1::BlobReceipt* receipt);
 
 }  // namespace calib::service

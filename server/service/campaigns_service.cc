@@ -214,7 +214,7 @@ grpc::ServerUnaryReactor* CampaignsService::ListFindings(Context* context,
 
 grpc::ServerReadReactor<v1::BlobChunk>* CampaignsService::PutBlob(Context* context,
                                                                   v1::BlobReceipt* reply) {
-  return ReceiveBlob(core_, *context, site_.state_folder, reply);
+  return ReceiveBlob(core_, *context, Right::kChange, site_.state_folder, reply);
 }
 
 grpc::ServerWriteReactor<v1::BlobChunk>* CampaignsService::GetBlob(

@@ -311,6 +311,7 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
   ASSIGN_OR_RETURN(const auto attempts, reader.AttemptsBySample(campaign));
   ASSIGN_OR_RETURN(const auto words, reader.WordsBySample(campaign));
+  ASSIGN_OR_RETURN(const auto kept, reader.KeptBySample(campaign));
   ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
   std::map<int, SamplePurpose> purposes;  // by iteration
   for (const store::IterationRecord& iteration : iterations) {
@@ -340,6 +341,15 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     message.set_attempts(made == attempts.end() ? 0 : made->second);
     if (const auto said = words.find(sample.sample); said != words.end()) {
       message.set_words(said->second);
+    }
+    if (const auto files = kept.find(sample.sample); files != kept.end()) {
+      for (const auto& [experiment, file] : files->second) {
+        v1::KeptFile& added = *message.add_kept();
+        added.set_name(file.name);
+        added.set_digest(file.digest);
+        added.set_reason(file.reason);
+        added.set_experiment(experiment);
+      }
     }
     if (sample.stream.has_value()) {
       message.set_stream(*sample.stream);

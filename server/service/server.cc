@@ -219,7 +219,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
       *impl->core,
       CampaignsService::Site{
           .state_folder = options.state_dir, .listen = options.listen, .tls = options.tls});
-  impl->workers = std::make_unique<WorkerLinkService>(*impl->core);
+  impl->workers = std::make_unique<WorkerLinkService>(*impl->core, options.state_dir);
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
   RETURN_IF_ERROR(loaded.get_future().get());

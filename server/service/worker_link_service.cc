@@ -262,4 +262,9 @@ grpc::ServerWriteReactor<v1::BlobChunk>* WorkerLinkService::GetBlob(
   return SendBlob(core_, *context, Right::kWork, *request, request->digest());
 }
 
+grpc::ServerReadReactor<v1::BlobChunk>* WorkerLinkService::PutBlob(
+    grpc::CallbackServerContext* context, v1::BlobReceipt* reply) {
+  return ReceiveBlob(core_, *context, Right::kWork, state_folder_, reply);
+}
+
 }  // namespace calib::service

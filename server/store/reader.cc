@@ -389,6 +389,24 @@ absl::StatusOr<std::map<int, std::string>> Reader::WordsBySample(std::int64_t ca
   });
 }
 
+absl::StatusOr<std::map<int, std::vector<std::pair<int, KeptFile>>>> Reader::KeptBySample(
+    std::int64_t campaign) {
+  return Guard([&] {
+    std::map<int, std::vector<std::pair<int, KeptFile>>> kept;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, experiment, name, coalesce(digest, ''), reason FROM kept "
+        "WHERE campaign = ? ORDER BY sample, experiment, name",
+        campaign);
+    while (row.executeStep()) {
+      kept[row.getColumn(0).getInt()].emplace_back(
+          row.getColumn(1).getInt(), KeptFile{.name = row.getColumn(2).getString(),
+                                              .digest = row.getColumn(3).getString(),
+                                              .reason = row.getColumn(4).getString()});
+    }
+    return kept;
+  });
+}
+
 absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t campaign,
                                                                     std::optional<int> sample) {
   return Guard([&] {

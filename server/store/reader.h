@@ -64,6 +64,9 @@ class Reader {
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
   /// What a program printed last on standard error where an attempt failed; the last such attempt.
   absl::StatusOr<std::map<int, std::string>> WordsBySample(std::int64_t campaign);
+  /// Files of a program that stay with a sample, or were to, each with its experiment.
+  absl::StatusOr<std::map<int, std::vector<std::pair<int, KeptFile>>>> KeptBySample(
+      std::int64_t campaign);
   /// Core time of all attempts that ended [s], by evaluation; for an evaluation that was reused
   /// that of the equal one that ran, where it is still there. Evaluations of which nothing is known
   /// are left out. Of one sample, or of all.

@@ -126,6 +126,13 @@ enum class AttemptOutcome {
 };
 const char* ToString(AttemptOutcome outcome);
 
+/// A file of a program's scratch folder that stays with its run.
+struct KeptFile {
+  std::string name{};
+  std::string digest{};  ///< of a blob; empty: it does not stay
+  std::string reason{};  ///< why not
+};
+
 /// What is recorded when an attempt ends.
 struct AttemptEnd {
   std::int64_t id = 0;
@@ -137,6 +144,7 @@ struct AttemptEnd {
   double core_seconds = 0;
   std::string staging{};
   std::string words{};  ///< of a program that failed: what it printed last on standard error
+  std::vector<KeptFile> kept{};  ///< each name once counts, the last; of an unknown blob none stays
 };
 
 struct StateRecord {

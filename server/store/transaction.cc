@@ -230,8 +230,12 @@ void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus statu
 
 void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest) {
   Guard([&] {
-    connection_.Run("DELETE FROM state WHERE campaign = ? AND sample = ? AND experiment = ?",
-                    key.campaign, key.sample, key.experiment);
+    for (const char* table : {"state", "kept"}) {
+      connection_.Run(absl::StrCat("DELETE FROM ", table,
+                                   " WHERE campaign = ? AND sample = ? AND experiment = ?")
+                          .c_str(),
+                      key.campaign, key.sample, key.experiment);
+    }
     connection_.Run(
         "UPDATE evaluation SET digest = ?, held_in = '', status = ?, aside = 0, reason = '', "
         "failures = 0 "
@@ -254,6 +258,11 @@ void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey
         "SELECT ?, ?, ?, load_step, observables, others FROM state "
         "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
         to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
+    connection_.Run(
+        "INSERT INTO kept(campaign, sample, experiment, name, digest, reason) "
+        "SELECT ?, ?, ?, name, digest, reason FROM kept "
+        "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
+        to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
   });
 }
 
@@ -274,6 +283,14 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
         "contact_updates = ?, core_seconds = ?, staging = ?, words = ? WHERE id = ?",
         end.ended_unix_ms, ToString(end.outcome), end.reason, end.steps, end.contact_updates,
         end.core_seconds, end.staging, end.words, end.id);
+    for (const KeptFile& file : end.kept) {
+      connection_.Run(
+          "INSERT INTO kept(campaign, sample, experiment, name, digest, reason) "
+          "SELECT campaign, sample, experiment, ?, (SELECT digest FROM blob WHERE digest = ?), ? "
+          "FROM attempt WHERE id = ? "
+          "ON CONFLICT DO UPDATE SET digest = excluded.digest, reason = excluded.reason",
+          file.name, file.digest, file.reason, end.id);
+    }
   });
 }
 

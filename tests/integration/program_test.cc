@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "tests/support/attacker.h"
 #include "tests/support/deployment.h"
 
 namespace calib::testing {
@@ -183,6 +184,39 @@ TEST(ProgramModel, WhatItTellsBesidesIsKept) {
   const v1::State& state = states->front().states(1);
   ASSERT_EQ(state.values_size(), 1);
   EXPECT_EQ(state.others().at("twice"), 2 * state.values(0));
+}
+
+TEST(ProgramModel, FilesStayWithTheirRunsUnderTheirDigestAlone) {
+  Deployment deployment({.name = "program-kept"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Attacker attacker(deployment.address());
+  v1::BlobChunk lie;
+  lie.set_digest(std::string(64, 'a'));
+  lie.set_data("of another digest");
+  const auto* const put = google::protobuf::DescriptorPool::generated_pool()->FindMethodByName(
+      "calib.v1.WorkerLink.PutBlob");
+  ASSERT_NE(put, nullptr);
+  EXPECT_EQ(attacker.Call(*put, lie).code(), absl::StatusCode::kInvalidArgument);
+  lie.clear_digest();
+  EXPECT_EQ(attacker.Call(*put, lie).code(), absl::StatusCode::kInvalidArgument);
+  deployment.StartWorker(2, MayRun());
+  const auto status = RunLine(
+      deployment,
+      MakeLine({.samples = 4, .iterations = 1, .model = "  keep: [request.json, dump.vtk]\n"}),
+      "kept");
+  Client client = deployment.client();
+  const auto samples = client.Samples(status.campaign());
+  ASSERT_TRUE(samples.ok() && !samples->empty());
+  for (const v1::Sample& sample : *samples) {
+    EXPECT_EQ(sample.status(), "finished") << "a missing file is no failure";
+    ASSERT_EQ(sample.kept_size(), 2);
+    EXPECT_EQ(sample.kept(0).name(), "dump.vtk");
+    EXPECT_EQ(sample.kept(0).digest(), "");
+    EXPECT_EQ(sample.kept(0).reason(), "is not there");
+    EXPECT_EQ(sample.kept(1).name(), "request.json");
+    EXPECT_EQ(sample.kept(1).digest().size(), 64U);
+  }
+  EXPECT_NE(samples->at(0).kept(1).digest(), samples->at(1).kept(1).digest());
 }
 
 TEST(ProgramModel, RunsThatGoWrongAreTakenForWhatTheyAre) {

@@ -23,6 +23,19 @@ namespace files = std::filesystem;
 constexpr const char* kAny = "*";
 constexpr const char* kScratchName = "{scratch}";
 
+// What an earlier run in this folder has left of files that stay with theirs, but for those that
+// are brought along.
+void RemoveKept(const v1::ProgramRun& program, const std::string& folder) {
+  for (const std::string& name : program.keep()) {
+    const auto is_brought = [&name](const v1::ProgramFile& file) { return file.name() == name; };
+    if (!CheckFileName(name).ok() ||
+        std::any_of(program.files().begin(), program.files().end(), is_brought))
+      continue;
+    std::error_code ignored;
+    files::remove(absl::StrCat(folder, "/", name), ignored);
+  }
+}
+
 bool IsExecutableFile(const std::string& path) {
   std::error_code error;
   return files::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
@@ -241,8 +254,31 @@ v1::Finished Programs::Evaluate(const v1::ProgramRun& program, std::int64_t atte
     const absl::MutexLock lock(&mutex_);
     --runs_;
   }
-  if (finished.ok()) return *finished;
+  if (finished.ok()) {
+    v1::Finished ended = *finished;
+    if (options_.put) Keep(report != nullptr ? *report : own, stop, ended);
+    return ended;
+  }
   return NotBegun(stop.stop_requested() ? absl::CancelledError("stopped") : finished.status());
+}
+
+// A file that is not taken is no failure of the run.
+void Programs::Keep(const ProgramReport& report, const std::stop_token& stop,
+                    v1::Finished& finished) const {
+  for (const KeptContent& file : report.kept) {
+    v1::KeptFile& kept = *finished.add_kept();
+    kept.set_name(file.name);
+    if (const absl::Status put = options_.put(file.content, stop); put.ok()) {
+      kept.set_digest(rpc::Sha256Hex(file.content));
+    } else {
+      kept.set_reason(absl::StrCat("the server does not take it: ", put.message()));
+    }
+  }
+  for (const auto& [name, why] : report.not_kept) {
+    v1::KeptFile& missing = *finished.add_kept();
+    missing.set_name(name);
+    missing.set_reason(why);
+  }
 }
 
 // Errors: why it has not begun (NotBegun).
@@ -265,6 +301,7 @@ absl::StatusOr<v1::Finished> Programs::Run(const v1::ProgramRun& program, std::i
     RETURN_IF_ERROR(scratch->CopyFiles(program.files(), folder.path(), stop));
   }
   const std::string path = is_new ? folder.path() : running->folder();
+  if (!is_new) RemoveKept(program, path);
   ASSIGN_OR_RETURN(const auto replacements, Replacements(program, path));
   RETURN_IF_ERROR(scratch->WriteTemplates(program.files(), replacements, path, stop));
   RETURN_IF_ERROR(WriteFileBelow(absl::StrCat(path, "/request.json"), absl::StrCat(request, "\n")));

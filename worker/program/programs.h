@@ -27,6 +27,7 @@ namespace calib::worker {
 
 struct ProgramsOptions {
   Fetch fetch{};                       ///< content of files
+  Put put{};                           ///< of files that stay with a run; empty: they go
   std::string scratch{};               ///< root of the folders (DefaultScratchRoot)
   std::vector<std::string> allowed{};  ///< names or paths; "*": any. Empty: no program may run
   int slots = 1;                       ///< runs at a time: so many persistent programs are kept
@@ -58,7 +59,8 @@ class Programs {
   ///   MODEL_FAILED  whatever else the program does or is
   ///   FAILED        it may not run here, or its files did not come, or the disk did not take them
   /// `words`: of what diverged or failed. attempt names the run to the program and is left to the
-  /// caller to set in the answer. report: nullptr, or what the run was like.
+  /// caller to set in the answer; `kept`: files that were put, or why not. report: nullptr, or what
+  /// the run was like.
   v1::Finished Evaluate(const v1::ProgramRun& program, std::int64_t attempt,
                         const ProgramStateSink& on_state, std::stop_token stop,
                         ProgramReport* report = nullptr);
@@ -87,6 +89,7 @@ class Programs {
                                                         RunFolder folder);
   std::unique_ptr<RunningProgram> TakeIdle(const std::string& identity);
   void GiveBack(const std::string& identity, std::unique_ptr<RunningProgram> program);
+  void Keep(const ProgramReport& report, const std::stop_token& stop, v1::Finished& finished) const;
   void EndUnused(const std::stop_token& stop);
 
   const ProgramsOptions options_;

@@ -45,8 +45,10 @@ absl::StatusOr<std::string> RequestText(const v1::ProgramRun& program, const std
     return absl::StrCat(QuotedJson(entry.first), ": ", QuotedJson(entry.second));
   };
   const auto quoted = [](const std::string& text) { return QuotedJson(text); };
+  const std::string test =
+      program.test().empty() ? "" : absl::StrCat(", \"test\": ", QuotedJson(program.test()));
   return absl::StrCat(
-      "{\"run\": ", QuotedJson(run), ", \"experiment\": ", QuotedJson(program.experiment()),
+      "{\"run\": ", QuotedJson(run), ", \"experiment\": ", QuotedJson(program.experiment()), test,
       ", \"realization\": ", program.realization(), ", \"parameters\": {",
       Joined(parameters, number_of), "}, \"units\": {", Joined(units, text_of), "}, \"effects\": [",
       Joined(program.effects(), quoted), "], \"settings\": ", *settings,

@@ -66,14 +66,14 @@ bool TableFile::Poll() {
 }
 
 void ReadKeptFiles(const std::vector<std::string>& names, const std::string& folder,
-                   std::vector<KeptContent>& kept, std::vector<std::string>& not_kept) {
+                   std::vector<KeptContent>& kept, std::map<std::string, std::string>& not_kept) {
   for (const std::string& name : names) {
     std::string why;
     const int file =
         CheckFileName(name).ok() ? OpenRegular(absl::StrCat(folder, "/", name), why) : -1;
     if (file < 0) {
       if (!CheckFileName(name).ok()) why = "is no name of a file of the scratch folder";
-      not_kept.push_back(absl::StrCat(name, " ", why.empty() ? "is not there" : why));
+      not_kept[name] = why.empty() ? "is not there" : why;
       continue;
     }
     std::string content;
@@ -84,7 +84,7 @@ void ReadKeptFiles(const std::vector<std::string>& names, const std::string& fol
     }
     close(file);
     if (static_cast<std::int64_t>(content.size()) > kMostKeptBytes) {
-      not_kept.push_back(absl::StrCat(name, " is larger than ", kMostKeptBytes / 1'000'000, " MB"));
+      not_kept[name] = absl::StrCat("is larger than ", kMostKeptBytes / 1'000'000, " MB");
     } else {
       kept.push_back({.name = name, .content = std::move(content)});
     }

@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,9 +40,9 @@ struct KeptContent {
 
 constexpr std::int64_t kMostKeptBytes = std::int64_t{256} << 20;  ///< of one file that is kept
 
-/// Adds the regular files of a folder that have these names to `kept`, and for each of the others a
-/// sentence why not to `not_kept`.
+/// Adds the regular files of a folder that have these names to `kept`, and for each of the others
+/// why not, in a clause, to `not_kept`.
 void ReadKeptFiles(const std::vector<std::string>& names, const std::string& folder,
-                   std::vector<KeptContent>& kept, std::vector<std::string>& not_kept);
+                   std::vector<KeptContent>& kept, std::map<std::string, std::string>& not_kept);
 
 }  // namespace calib::worker

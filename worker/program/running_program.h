@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -38,7 +39,7 @@ struct ProgramReport {
   std::string words{};                     ///< the last 4 KiB of standard error
   std::vector<std::string> checkpoints{};  ///< files that were named
   std::vector<KeptContent> kept{};         ///< of a run that completed or diverged
-  std::vector<std::string> not_kept{};     ///< sentences: which file of `keep` is missing, and why
+  std::map<std::string, std::string> not_kept{};  ///< why not, by name of a file of `keep`
 };
 
 using ProgramStateSink = std::function<void(v1::State)>;

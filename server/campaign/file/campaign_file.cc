@@ -16,6 +16,7 @@
 #include "server/campaign/checks/grain_check.h"
 #include "server/campaign/checks/setting_ends.h"
 #include "server/campaign/file/parameters/setting_names.h"
+#include "server/campaign/file/program/read_next.h"
 #include "server/campaign/file/program/read_program.h"
 #include "server/campaign/file/read_experiment.h"
 #include "server/campaign/file/read_inference.h"
@@ -227,6 +228,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadExperiments(map, context, campaign);
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
     if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
+    if (campaign.program && problems.size() == before) ReadNext(map, context, campaign);
     if (is_new && campaign.program && problems.size() == before) CheckProgram(map, campaign);
     if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
     if (is_new) CheckReplicates(map, campaign);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -18,25 +17,8 @@
 namespace calib::campaign {
 namespace {
 
-// Names stand in tables, file names and on the command line.
-bool IsShortWord(const std::string& name) {
-  const auto plain = [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
-  };
-  constexpr std::size_t kLongest = 64;
-  return !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), plain);
-}
-
 std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
-  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
-  if (map.Has("name") && !IsShortWord(name)) {
-    map.Problem("name",
-                absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
-  }
-  const unsigned char first = name.empty() ? 'a' : static_cast<unsigned char>(name.front());
-  if (context.is_new() && std::isalnum(first) == 0 && first != '_') {  // a folder of this name: ..
-    map.Problem("name", absl::StrCat(Quoted(name), " has to begin with a letter, a digit or _"));
-  }
+  std::string name = ReadShortName(map, context.is_new());
   for (const Experiment& other : campaign.experiments) {
     if (!name.empty() && other.name == name) {
       map.Problem("name", absl::StrCat(Quoted(name), " is the name of two experiments"));

@@ -142,7 +142,7 @@ void CheckDesign(const MapReader& campaign_map, const Campaign& campaign) {
   const bool at_rest =
       std::any_of(campaign.experiments.begin(), campaign.experiments.end(), ReadAtRest);
   for (const CalibratedParameter& parameter : campaign.parameters) {
-    if (!at_rest && FindNumerics(parameter.name) != nullptr) {
+    if (!campaign.program && !at_rest && IsNumerics(campaign, parameter.name)) {
       campaign_map.Problem("parameters", absl::StrCat(parameter.name, " changes nothing: no test ",
                                                       "is walked in stages"));
     }

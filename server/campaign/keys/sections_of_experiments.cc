@@ -140,6 +140,22 @@ Section ToldRealizations() {
           {{"NAME", ListOf(Text()), "", "a setting, one value per realization"}}};
 }
 
+Section ProgramNext() {
+  return {"program_next",
+          "model.next[]",
+          {
+              {"name", Text(), kRequired, "of the experiment that it would be"},
+              {"test", OneWord(TestNames()), "none", "lab test (`calibctl tests`)"},
+              {"settings", MapOf("told_settings"), "none", "what the program is told"},
+              {"realizations", AnyOf({Whole(1, 1000), MapOf("told_realizations")}),
+               "of the first calibrated experiment", "as there"},
+              {"control", Text(), kRequired, "the column that drives it"},
+              {"values", ListOf(Text()), kRequired, "of the control, with their unit"},
+              {"observables", MapOf("observables"), "of the first calibrated experiment",
+               "with their errors, `relative` or `absolute`"},
+          }};
+}
+
 Section MeshesKeys() {
   return {"meshes",
           "experiments[].meshes",
@@ -220,9 +236,9 @@ Section StagingKeys() {
 }  // namespace
 
 std::vector<Section> SectionsOfExperiments() {
-  return {ExperimentKeys(), ToldSettings(),  ToldRealizations(),  PackingKeys(), Recipe(),
-          Sizes(),          MeshesKeys(),    MeshKeys(),          Bodies(),      Shares(),
-          ControlKeys(),    Consolidation(), InitialStressKeys(), StagingKeys()};
+  return {ExperimentKeys(), ToldSettings(), ToldRealizations(), ProgramNext(),       PackingKeys(),
+          Recipe(),         Sizes(),        MeshesKeys(),       MeshKeys(),          Bodies(),
+          Shares(),         ControlKeys(),  Consolidation(),    InitialStressKeys(), StagingKeys()};
 }
 
 }  // namespace calib::campaign

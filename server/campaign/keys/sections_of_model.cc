@@ -257,17 +257,6 @@ Section ProgramNumericsKeys() {
           {{"NAME", MapOf("program_number"), "", "a parameter of the program"}}};
 }
 
-Section ProgramNext() {
-  return {"program_next",
-          "model.next[]",
-          {
-              {"name", Text(), kRequired, "of the test"},
-              {"settings", MapOf("told_settings"), "none", "what the program is told"},
-              {"control", Text(), kRequired, "the column that drives it"},
-              {"values", ListOf(Text()), kRequired, "of the control, with their unit"},
-          }};
-}
-
 Section ProgramNumber() {
   return {"program_number",
           "model.numerics.NAME",
@@ -298,8 +287,7 @@ std::vector<Section> SectionsOfModel() {
           ProgramStates(),
           ProgramLimitKeys(),
           ProgramNumericsKeys(),
-          ProgramNumber(),
-          ProgramNext()};
+          ProgramNumber()};
 }
 
 }  // namespace calib::campaign

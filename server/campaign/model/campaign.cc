@@ -73,13 +73,45 @@ double ErrorOf(const NoiseLaw& law, double value) {
   return law.absolute ? *law.absolute : std::hypot(law.relative * value, law.floor);
 }
 
+NoiseLaw LawOf(const MeasuredObservable& observable) {
+  if (observable.noise) return *observable.noise;
+  if (observable.sd.empty()) return {.relative = 0, .floor = 0, .absolute = 0};
+  const std::vector<Eigen::Index> rows = RowsRead(observable);
+  double sum = 0;
+  for (const Eigen::Index row : rows) {
+    sum += observable.sd[static_cast<std::size_t>(row)] / static_cast<double>(rows.size());
+  }
+  return {.relative = 0, .floor = 0, .absolute = sum};
+}
+
+double CorrelationLengthOf(const std::vector<double>& control,
+                           const MeasuredObservable& observable) {
+  const Eigen::MatrixXd& c = observable.covariance;
+  if (c.rows() == 0) return observable.correlation_length;
+  double decay = 0;
+  double way = 0;
+  const std::vector<Eigen::Index> rows = RowsRead(observable);
+  for (std::size_t k = 1; k < rows.size(); ++k) {
+    const Eigen::Index i = rows[k];
+    const Eigen::Index before = rows[k - 1];
+    const double correlation = c(i, before) / std::sqrt(c(i, i) * c(before, before));
+    if (!(correlation > 0)) return 0;
+    decay -= std::log(std::min(1.0, correlation));
+    way +=
+        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(before)]);
+  }
+  return decay > 0 ? way / decay : 0;
+}
+
 double ScatterShare(const Experiment& experiment) {
   if (!experiment.specimen_grains || experiment.specimens.empty()) return 1;
   double grains = 0;
   if (const auto* file = std::get_if<PackingFile>(&experiment.specimens.front())) {
     grains = static_cast<double>(file->packing.x.size());
+  } else if (const auto* recipe = std::get_if<dem::PackingRecipe>(&experiment.specimens.front())) {
+    grains = recipe->particles;
   } else {
-    grains = std::get<dem::PackingRecipe>(experiment.specimens.front()).particles;
+    return 1;  // nobody knows how many a program's specimen has
   }
   return std::min(1.0, grains / *experiment.specimen_grains);
 }

@@ -60,12 +60,20 @@ struct MeasuredObservable {
   std::string unit = "1";  ///< SI, of the catalogue or of the column
 };
 
+/// The law of its errors; where the file states none, their mean as an absolute error (0 of none).
+NoiseLaw LawOf(const MeasuredObservable& observable);
+
 /// Indices of the rows in which it was measured.
 std::vector<Eigen::Index> RowsRead(const MeasuredObservable& observable);
 /// How many these are.
 inline std::size_t ReadingsOf(const MeasuredObservable& observable) {
   return RowsRead(observable).size();
 }
+
+/// Over which its errors fall to 1/e along the control, of a covariance along neighbouring
+/// readings; 0: independent. control: one per row.
+double CorrelationLengthOf(const std::vector<double>& control,
+                           const MeasuredObservable& observable);
 
 /// A specimen: the packing file's content (path as written, parsed), or a recipe.
 struct PackingFile {
@@ -254,6 +262,9 @@ struct Campaign {
   /// Where correlations or constraints tie them; their priors are its marginals.
   std::optional<inference::JointPrior> tied_prior;
   std::vector<Experiment> experiments;
+  /// Tests that may be proposed to a program: experiments without readings, `control` as they would
+  /// be driven.
+  std::vector<Experiment> next{};
   Method method = Method::kIterativeBayesianFilter;
   int samples = 100;
   /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.

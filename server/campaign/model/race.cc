@@ -36,6 +36,16 @@ dem::ParameterInfo Factor(const char* name, const char* on) {
   return info;
 }
 
+std::string PrefixOfNumerics() { return absl::StrCat(kNumerics, "."); }
+
+// What the program of the campaign declares under a dotted name; nullptr: nothing.
+const ProgramNumerics* NumericsOfProgram(const Campaign& campaign, const std::string& name) {
+  const std::string prefix = PrefixOfNumerics();
+  if (!campaign.program || !name.starts_with(prefix)) return nullptr;
+  const auto found = campaign.program->numerics.find(name.substr(prefix.size()));
+  return found == campaign.program->numerics.end() ? nullptr : &found->second;
+}
+
 bool IsOneOf(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
@@ -94,6 +104,23 @@ const dem::ParameterInfo* FindNumerics(const std::string& name) {
   return nullptr;
 }
 
+bool IsNumerics(const Campaign& campaign, const std::string& name) {
+  return campaign.program ? NumericsOfProgram(campaign, name) != nullptr
+                          : FindNumerics(name) != nullptr;
+}
+
+std::map<std::string, double> NumericsOf(const Campaign& campaign, std::span<const double> values) {
+  std::map<std::string, double> told;
+  if (!campaign.program) return told;
+  for (const auto& [name, choice] : campaign.program->numerics) told[name] = choice.null;
+  if (campaign.method != Method::kDesign) return told;
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    const std::string& name = campaign.parameters[j].name;
+    if (IsNumerics(campaign, name)) told[name.substr(PrefixOfNumerics().size())] = values[j];
+  }
+  return told;
+}
+
 std::string EffectNamedIn(const std::string& parameter) {
   if (parameter.find('@') != std::string::npos) return "";  // of a label, which may be any word
   const std::size_t last = parameter.rfind('.');
@@ -111,7 +138,10 @@ dem::Model ModelWithRace(const Campaign& campaign) {
 
 std::optional<double> NullOf(const Campaign& campaign, const std::string& parameter) {
   if (campaign.method != Method::kDesign) return std::nullopt;
-  if (const dem::ParameterInfo* factor = FindNumerics(parameter)) return factor->null_value;
+  if (IsNumerics(campaign, parameter)) {
+    return campaign.program ? NumericsOfProgram(campaign, parameter)->null
+                            : FindNumerics(parameter)->null_value;
+  }
   const dem::EffectInfo* effect = FindRacing(campaign, EffectNamedIn(parameter));
   const dem::ParameterInfo* info = effect == nullptr ? nullptr : ParameterIn(*effect, parameter);
   if (info == nullptr) return std::nullopt;
@@ -158,7 +188,7 @@ dem::Model ModelOf(const Campaign& campaign, const Experiment& experiment,
     const std::string effect = EffectNamedIn(name);
     const bool absent =
         campaign.parameters[j].setting || campaign.parameters[j].of_population ||
-        (is_design && (FindNumerics(name) != nullptr ||
+        (is_design && (IsNumerics(campaign, name) ||
                        (IsOneOf(campaign.race, effect) && !IsOneOf(active, effect))));
     if (!absent) model.parameters[name] = values[j];
   }

@@ -4,6 +4,7 @@
 // their null is not in the run: not in the model, and none of its parameters is. So equal runs of a
 // base, its design and its extensions are equal scenarios. Pure.
 
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,6 +22,12 @@ namespace calib::campaign {
 inline constexpr const char* kNumerics = "numerics";
 /// The entry of such a parameter by its dotted name; nullptr: it is none.
 const dem::ParameterInfo* FindNumerics(const std::string& name);
+/// Whether a design changes by this parameter how the runs of the campaign are made: one of the
+/// above or, where a program is the model, numerics.NAME of what that declares.
+bool IsNumerics(const Campaign& campaign, const std::string& name);
+/// What a program is told of its numerics: each at its null, or as the values of a design change
+/// it.
+std::map<std::string, double> NumericsOf(const Campaign& campaign, std::span<const double> values);
 
 /// The effect that a dotted parameter name is of: X of "X.friction" and of "A-B.X.friction"; "" of
 /// a plain name, and of a name with a label.

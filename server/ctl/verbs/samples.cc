@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 #include <sstream>
 #include <string>
@@ -55,6 +56,11 @@ absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& o
               << "\n  its program printed last on standard error:\n";
     std::istringstream lines(s.words());
     for (std::string line; std::getline(lines, line);) std::cout << "  | " << line << "\n";
+  }
+  const auto keeps = [](const v1::Sample& s) { return s.kept_size() > 0; };
+  if (std::any_of(samples.begin(), samples.end(), keeps)) {
+    std::cout << "\nFiles of the program that stay with a sample: calibctl kept "
+              << options.campaign << " SAMPLE.\n";
   }
   return kDone;
 }

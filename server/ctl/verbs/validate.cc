@@ -6,7 +6,6 @@
 #include "server/campaign/checks/experiment_summary.h"
 #include "server/campaign/checks/warning.h"
 #include "server/campaign/file/parameters/setting_names.h"
-#include "server/campaign/file/text/yaml_text.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
@@ -71,24 +70,11 @@ std::string ProgramText(const campaign::Program& program) {
 }
 
 // Of what the file says of a program what nothing acts on, so that nobody counts on it.
-std::vector<std::string> NotActedOn(const campaign::Program& program, const std::string& yaml) {
+std::vector<std::string> NotActedOn(const campaign::Program& program) {
   std::vector<std::string> sentences;
-  if (!program.keep.empty()) {
-    sentences.emplace_back(
-        "model.keep: these files are not brought to the server; they go with the scratch folder.");
-  }
   if (program.checkpoint) {
     sentences.emplace_back(
         "model.checkpoint: no checkpoint is asked for; a run that is tried again begins anew.");
-  }
-  if (!program.numerics.empty()) {
-    sentences.emplace_back("model.numerics: diagnose does not try them.");
-  }
-  const campaign::YamlParse parsed = campaign::ParseYaml(yaml);
-  const campaign::YamlNode* model =
-      parsed.root ? campaign::YamlFind(*parsed.root, "model") : nullptr;
-  if (model != nullptr && campaign::YamlFind(*model, "next") != nullptr) {
-    sentences.emplace_back("model.next: diagnose proposes no test of a program.");
   }
   return sentences;
 }
@@ -100,8 +86,7 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
   std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
   for (std::string& note : campaign::ParameterNotes(campaign)) notes.push_back(std::move(note));
   if (campaign.program) {
-    for (std::string& note : NotActedOn(*campaign.program, source->yaml))
-      notes.push_back(std::move(note));
+    for (std::string& note : NotActedOn(*campaign.program)) notes.push_back(std::move(note));
   }
   std::vector<campaign::ExperimentSummary> summaries;
   for (const campaign::Experiment& experiment : campaign.experiments) {

@@ -523,6 +523,21 @@ std::string LineageJson(const std::string& campaign, const std::vector<Branch>& 
   return Dump({{"campaign", campaign}, {"nodes", nodes}});
 }
 
+namespace {
+
+Json KeptJson(const v1::Sample& sample) {
+  Json kept = Json::array();
+  for (const v1::KeptFile& file : sample.kept()) {
+    kept.push_back({{"experiment", file.experiment()},
+                    {"name", file.name()},
+                    {"digest", file.digest().empty() ? Json(nullptr) : Json(file.digest())},
+                    {"reason", file.reason()}});
+  }
+  return kept;
+}
+
+}  // namespace
+
 std::string SamplesJson(const std::string& campaign,
                         std::span<const campaign::CalibratedParameter> parameters,
                         const std::vector<v1::Sample>& samples) {
@@ -545,6 +560,7 @@ std::string SamplesJson(const std::string& campaign,
                     {"log_likelihood", s.log_likelihood()},
                     {"attempts", s.attempts()},
                     {"words", s.words().empty() ? Json(nullptr) : Json(s.words())},
+                    {"kept", KeptJson(s)},
                     {"purpose", s.purpose()}});
   }
   return Dump({{"campaign", campaign}, {"units", units}, {"samples", list}});

@@ -26,6 +26,7 @@ def at(p, on, pressure, strain, seed):
         - 4 * wear * strain + 60 * lock * strain ** 2
     v = 0.12 * strain * math.exp(-100 * strain) + 0.02 * bonds * strain + 0.2 * wear * strain \
         - (0.35 * p["friction"] + 0.5 * rolling) * max(strain - 0.006, 0.0) - lock * strain ** 2
+    q += (1 + q) * 0.2 * (p["step"] - 0.1)
     return (1 + q) * (1 + 0.005 * chance(seed) + 0.004 * chance(7 * seed) * math.sin(40 * strain)), \
         v + 0.006 * strain * chance(3 * seed)
 
@@ -63,7 +64,7 @@ for name, pressure in (("low", 1e5), ("high", 3e5)):
                                      kReadings, R"():
             strain = 0.002 + 0.058 * k / )",
                                      kReadings - 1, R"(
-            q, v = at({"modulus": 1e9, "friction": 0.5, )",
+            q, v = at({"modulus": 1e9, "friction": 0.5, "step": 0.1, )",
                                      values, R"(}, )", effects,
                                      R"(, pressure, strain, 1001)
             print(strain, q * (1 + random.gauss(0, 0.01)), v + random.gauss(0, 2e-4), sep=",", file=table)
@@ -80,6 +81,7 @@ model:
   command: [/usr/bin/python3, code.py]
   files: [code.py]
   persistent: true
+  numerics: {step: {null: 0.1, sd: 0.05}}
   limits: {silence: 60 s}
   effects:
     rolling: {parameters: {friction: {null: 0, prior: {prior: uniform, min: 0, max: 0.5}}}}
@@ -126,6 +128,12 @@ TEST_F(ProgramEffects, TheOneThatMadeTheMeasurementIsFoundAndAdded) {
     instruments = instruments || one["effect"] == "load_cell_error";
   }
   EXPECT_TRUE(instruments) << answer.out;
+  // A step of one sd moves one of two observables by a hundredth, its noise.
+  ASSERT_EQ(found["numerics"].size(), 1U) << answer.out;
+  EXPECT_EQ(found["numerics"][0]["name"], "numerics.step");
+  EXPECT_NEAR(found["numerics"][0]["tried"].get<double>(), 0.15, 1e-12);
+  EXPECT_GT(found["numerics"][0]["rms"].get<double>(), 0.2);
+  EXPECT_LT(found["numerics"][0]["rms"].get<double>(), 0.8);
   const Answer improved = Call("improve c1 --state s --workers 2 --json");
   ASSERT_EQ(improved.code, 0) << improved.err;
   const Json steps = improved.json()["steps"];

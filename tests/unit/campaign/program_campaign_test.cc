@@ -187,6 +187,10 @@ TEST(ProgramCampaign, ATestThatIsNamedHasItsObservablesUnitsAndRanges) {
   const ReadOutcome outcome = ReadProgramYaml(yaml, files);
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   EXPECT_EQ(outcome.campaign.experiments[0].settings.at("confining_pressure"), 2e5);
+  const Campaign unnamed = ReadProgramYaml(ProgramYaml()).campaign;
+  const RunOf values{.values = {2e3, 0.5}, .stream = 0};
+  EXPECT_EQ(messages::ProgramRunOf(outcome.campaign, 0, values).test(), "triaxial_drained");
+  EXPECT_EQ(messages::ProgramRunOf(unnamed, 0, values).test(), "");
   EXPECT_DOUBLE_EQ(outcome.campaign.experiments[0].control[1], -std::log1p(-0.01));
   EXPECT_THAT(ProblemsOf(absl::StrReplaceAll(yaml, {{"0.2 MPa", "-1 MPa"}}), files),
               HasSubstr("confining_pressure"));
@@ -233,6 +237,18 @@ TEST(ProgramCampaign, RefusesWhatCannotBeMeantInOneSentenceEach) {
        "command is missing"},
       {absl::StrCat(ProgramYaml(), "early_stopping: {discard_at_most: 1e-3, rungs: [0.5]}\n"),
        "would begin anew"},
+      {SpoiledProgram("  version:", "  keep: [../up]\n  version:"), "no name of a file"},
+      {SpoiledProgram("  version:", "  keep: [/tmp/a]\n  version:"), "no name of a file"},
+      {SpoiledProgram("  version:", "  keep: [a, a]\n  version:"), "stands here twice"},
+      {SpoiledProgram("  version:", "  numerics: {seed: {null: 1, sd: 1}}\n  version:"),
+       "numerics.seed is a reserved name"},
+      {SpoiledProgram("  version:", "  numerics: {friction: {null: 1, sd: 1}}\n  version:"),
+       "what is calibrated matters"},
+      {SpoiledProgram("  version:", "  numerics: {rate: {null: 1, sd: 1}}\n  version:"),
+       "the name of a setting and of a parameter"},
+      {SpoiledProgram("  version:", "  numerics: {step: {null: 1, sd: 0}}\n  version:"),
+       "model.numerics.step.sd"},
+      {SpoiledProgram("  version:", "  numerics: {step: {null: 1}}\n  version:"), "sd: is missing"},
       {SpoiledProgram("inference:", "failure: {at_limit: perhaps}\ninference:"), "at_limit"},
   };
   for (const auto& one : cases) {
@@ -240,17 +256,89 @@ TEST(ProgramCampaign, RefusesWhatCannotBeMeantInOneSentenceEach) {
   }
 }
 
-TEST(ProgramCampaign, TestsThatMayBeProposedAreHeldToTheirForm) {
-  const auto with = [](const std::string& next) {
-    return SpoiledProgram("  version:", "  next: " + next + "\n  version:");
+TEST(ProgramCampaign, SettingsThatShouldNotMatterAreToldAtTheirNull) {
+  const ReadOutcome outcome = ReadProgramYaml(SpoiledProgram(
+      "  version:", "  numerics: {time_step_factor: {null: 0.8, sd: 0.2}}\n  version:"));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  const auto told = [](const Campaign& campaign, std::vector<double> values) {
+    const v1::ProgramRun run =
+        messages::ProgramRunOf(campaign, 0, {.values = std::move(values), .stream = 0});
+    EXPECT_EQ(run.parameters_size(), 3);  // what a design calls it has no part in the request
+    return run.parameters().at("time_step_factor");
   };
-  EXPECT_EQ(ProblemsOf(with("[{name: oedometer, settings: {pressure: 0.1 MPa}, control: pull, "
-                            "values: [1 mm, 2 mm]}]"),
-                       ProgramFiles()),
-            "");
-  EXPECT_THAT(ProblemsOf(with("[{name: oedometer, control: pull}]"), ProgramFiles()),
-              HasSubstr("model.next[1].values: is missing"));
-  EXPECT_THAT(ProblemsOf(with("oedometer"), ProgramFiles()), HasSubstr("has to be a list"));
+  EXPECT_EQ(told(outcome.campaign, {2e3, 0.5}), 0.8);
+  Campaign design = outcome.campaign;
+  design.method = Method::kDesign;
+  design.parameters.push_back({.name = "numerics.time_step_factor", .unit = "1", .prior = {}});
+  EXPECT_EQ(told(design, {2e3, 0.5, 1}), 1);
+  EXPECT_EQ(told(design, {2e3, 0.5, 0.8}), 0.8);
+}
+
+std::string WithNext(const std::string& next) {
+  return SpoiledProgram("  version:", "  next: " + next + "\n  version:");
+}
+
+TEST(ProgramCampaign, ATestThatMayBeProposedIsAnExperimentWithoutReadings) {
+  const ReadOutcome outcome = ReadProgramYaml(
+      WithNext("[{name: fast, settings: {rate: 4 mm/s}, control: pull, values: [1 mm, 2 mm]}, "
+               "{name: twist, control: angle, values: [0, 45 deg], realizations: 3, "
+               "observables: {torque: {noise: {relative: 0.1, floor: 2 N m}}}}]"));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  ASSERT_EQ(outcome.campaign.next.size(), 2U);
+  const Experiment& fast = outcome.campaign.next[0];
+  EXPECT_EQ(fast.told.at("rate"), "0.004");
+  EXPECT_THAT(fast.control, ElementsAre(1e-3, 2e-3));
+  EXPECT_EQ(fast.control_unit, "m");
+  ASSERT_EQ(fast.observables.size(), 1U) << "as of the experiment";
+  EXPECT_EQ(fast.observables[0].name, "force");
+  EXPECT_EQ(fast.observables[0].unit, "N");
+  EXPECT_EQ(fast.observables[0].noise->absolute, 100);
+  const Experiment& twist = outcome.campaign.next[1];
+  EXPECT_EQ(twist.specimens.size(), 3U);
+  EXPECT_EQ(twist.observables[0].noise->floor, 2);
+  EXPECT_EQ(twist.observables[0].noise->relative, 0.1);
+}
+
+TEST(ProgramCampaign, TestsThatMayBeProposedAreHeldToTheirForm) {
+  const std::string fast = "name: fast, control: pull, values: [1 mm, 2 mm]";
+  const struct {
+    std::string next;
+    const char* says;
+  } cases[] = {
+      {"[{name: fast, control: pull}]", "model.next[1].values: is missing"},
+      {"fast", "has to be a list"},
+      {"[{name: fast, control: pull, values: [1 mm]}]", "two values or more"},
+      {"[{name: fast, control: pull, values: [1 mm, 1 mm]}]", "two values or more"},
+      {"[{name: fast, control: pull, values: [1 mm, 2 s]}]", "another unit"},
+      {"[{name: fast, control: pull, values: [1 mm, 2 mmm]}]", "mmm"},
+      {"[{name: fast one, control: pull, values: [1 mm, 2 mm]}]", "not a short word"},
+      {"[{name: pull, control: pull, values: [1 mm, 2 mm]}]", "is an experiment of the campaign"},
+      {"[{" + fast + "}, {" + fast + "}]", "the name of two tests"},
+      {"[{" + fast + ", test: pulling}]", "is unknown"},
+      {"[{" + fast + ", test: triaxial_drained}]", "observables: is missing"},
+      {"[{" + fast + ", packing: a.txt}]", "move it there"},
+      {"[{" + fast + ", observables: {force: {noise: {column: sd}}}}]", "there are none yet"},
+      {"[{" + fast + ", observables: {force: {}}}]", "noise: is missing"},
+      {"[{" + fast + ", observables: {pull: {noise: {absolute: 1 mm}}}}]", "is the control"},
+      {"[{" + fast + ", settings: {friction: 3}}]", "the name of a setting and of a parameter"},
+      {"[{" + fast + ", settings: {seed: 3}}]", "seed is a reserved name"},
+  };
+  for (const auto& one : cases) {
+    EXPECT_THAT(ProblemsOf(WithNext(one.next), ProgramFiles()), HasSubstr(one.says)) << one.next;
+  }
+}
+
+TEST(ProgramCampaign, ATestIsNotToldWhatItsRealizationsDifferBy) {
+  const auto with = [](const std::string& more) {
+    return absl::StrReplaceAll(
+        WithNext("[{name: fast, control: pull, values: [1 mm, 2 mm], settings: {packing: b.txt}" +
+                 more + "}]"),
+        {{"packing: a.txt, flag", "flag"},
+         {"    control: pull\n",
+          "    realizations: {packing: [a.txt, b.txt]}\n    control: pull\n"}});
+  };
+  EXPECT_THAT(ProblemsOf(with(""), ProgramFiles()), HasSubstr("give it realizations of its own"));
+  EXPECT_EQ(ProblemsOf(with(", realizations: 2"), ProgramFiles()), "");
 }
 
 TEST(ProgramCampaign, SaysOfAScriptBesideTheCampaignThatItIsNotBrought) {

@@ -95,6 +95,37 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
   EXPECT_EQ(*reader.LastCampaign(), 7);
 }
 
+TEST_F(StoreTest, FilesOfAProgramStayWithTheirRunAndWithWhatReusesIt) {
+  constexpr EvaluationKey kOther{.campaign = 1, .sample = 0, .experiment = 1};
+  Write([&](Transaction& t) {
+    PutEvaluation(t);
+    t.InsertEvaluation({.key = kOther, .digest = "d"});
+    t.PutBlob("abc", std::string("dump"));
+    t.InsertAttempt({.id = 1, .key = kKey, .worker = "w"});
+    t.EndAttempt({.id = 1,
+                  .outcome = AttemptOutcome::kCompleted,
+                  .kept = {{.name = "dump.vtk", .digest = "abc"},
+                           {.name = "log", .reason = "is not there"},
+                           {.name = "lost", .digest = "never put"}}});
+    t.EndAttempt({.id = 77, .outcome = AttemptOutcome::kCompleted, .kept = {{.name = "x"}}});
+    t.ReuseEvaluation(kKey, kOther);
+  });
+  const auto kept = Read().KeptBySample(1);
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  ASSERT_EQ(kept->size(), 1U);
+  const auto& files = kept->at(0);
+  ASSERT_EQ(files.size(), 6U);
+  for (std::size_t k = 0; k < files.size(); ++k) EXPECT_EQ(files[k].first, k < 3 ? 0 : 1);
+  EXPECT_EQ(files[0].second.name, "dump.vtk");
+  EXPECT_EQ(files[0].second.digest, "abc");
+  EXPECT_EQ(files[1].second.reason, "is not there");
+  EXPECT_EQ(files[2].second.digest, "") << "of a content that nobody has";
+  Write([&](Transaction& t) { t.BeginAnew(kKey, "e"); });
+  EXPECT_EQ(Read().KeptBySample(1)->at(0).size(), 3U);
+  Write([&](Transaction& t) { t.DeleteCampaign(1); });
+  EXPECT_TRUE(Read().KeptBySample(1)->empty());
+}
+
 TEST_F(StoreTest, DoublesSurviveBitForBit) {
   const std::vector<double> values = {0.1, -0.0, 5e-324, 1.7976931348623157e308, 1.0 / 3.0};
   Write([&](Transaction& t) {

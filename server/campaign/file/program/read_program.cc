@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
+#include "dem/registry/declared_effects.h"
 #include "server/campaign/file/shared/read_user_effects.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
@@ -22,6 +23,8 @@ namespace {
 /// Files that one program brings at most: as many as a submission may name, with room for its data
 /// and packings.
 constexpr std::size_t kMostFiles = 3000;
+/// Files of a run that stay with it at most, as v1::ProgramRun has them.
+constexpr std::size_t kMostKept = 64;
 /// What {NAME} stands for in every command and template.
 constexpr std::array kReserved = {"scratch", "threads", "seed"};
 
@@ -223,27 +226,54 @@ void ReadNumerics(MapReader& model, Program& program) {
   map->Finish();
 }
 
-// Tests that could be proposed: held to their form, and to nothing else yet.
-void ReadNext(MapReader& model) {
-  const YamlNode* node = model.Find("next");
-  if (node == nullptr) return;
-  if (node->kind != YamlNode::Kind::kSequence) {
-    model.Problem("next", "has to be a list of tests, each beginning with '- name: ...'");
-    return;
-  }
-  for (std::size_t i = 0; i < node->items.size(); ++i) {
-    MapReader test(node->items[i], absl::StrCat(model.PathOf("next"), "[", i + 1, "]"),
-                   SectionOf("program_next"), model.problems());
-    test.RequiredText("name", "what the test is called");
-    test.RequiredText("control", "the column that drives it");
-    test.Require("values", "of the control, e.g. [1 percent, 2 percent]");
-    test.TextList("values");
-    if (auto settings = test.Map("settings")) {
-      settings->Ignore(settings->Keys());
-      settings->Finish();
+// A name of the numerics stands for one thing in a request and a design.
+void CheckNumerics(const MapReader& campaign_map, const Campaign& campaign,
+                   const std::set<std::string>& parameters) {
+  const auto& declared = campaign.model.user_effects;
+  const std::string prefix = absl::StrCat(kNumerics, ".");
+  for (const auto& [name, choice] : campaign.program->numerics) {
+    if (std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end()) {
+      campaign_map.Problem("model",
+                           absl::StrCat("numerics.", name, " is a reserved name; call it another"));
     }
-    test.Finish();
+    if (parameters.contains(name)) {
+      campaign_map.Problem("model", absl::StrCat("numerics.", name,
+                                                 " is a parameter as well: what is calibrated "
+                                                 "matters; keep one of them"));
+    }
+    if (campaign.method != Method::kDesign && parameters.contains(prefix + name)) {
+      campaign_map.Problem(
+          "parameters", absl::StrCat(prefix, name, " is what diagnose calls the change of ", name,
+                                     "; call the parameter another"));
+    }
   }
+  if (!campaign.program->numerics.empty() && dem::FindEffect(declared, kNumerics) != nullptr) {
+    campaign_map.Problem("model", absl::StrCat("effects.", kNumerics,
+                                               " is what diagnose calls changes of the numerics; "
+                                               "call the effect another"));
+  }
+}
+
+// Names of files of the scratch folder.
+std::vector<std::string> ReadKeep(MapReader& model) {
+  std::vector<std::string> names = model.TextList("keep").value_or(std::vector<std::string>{});
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    const std::filesystem::path path(name);
+    if (name.empty() || path.is_absolute() || path.lexically_normal() != path ||
+        *path.begin() == ".." || path.filename().empty()) {
+      model.Problem("keep", absl::StrCat(Quoted(name),
+                                         " is no name of a file of the scratch "
+                                         "folder: dump.vtk, out/dump.vtk"));
+    } else if (!seen.insert(name).second) {
+      model.Problem("keep", absl::StrCat(Quoted(name), " stands here twice; keep one"));
+    }
+  }
+  if (names.size() > kMostKept) {
+    model.Problem("keep", absl::StrCat("names ", names.size(), " files, and a run keeps ",
+                                       kMostKept, "; let the program pack them"));
+  }
+  return names;
 }
 
 }  // namespace
@@ -263,7 +293,7 @@ void ReadProgram(MapReader& model, ReadContext& context, Campaign& campaign) {
   FilesReader files(model, context, program);
   files.Read("files", false);
   files.Read("templates", true);
-  program.keep = model.TextList("keep").value_or(std::vector<std::string>{});
+  program.keep = ReadKeep(model);
   program.checkpoint = model.TrueOrFalse("checkpoint").value_or(false);
   program.persistent = model.TrueOrFalse("persistent").value_or(false);
   program.states = ReadStatesTable(model);
@@ -271,7 +301,7 @@ void ReadProgram(MapReader& model, ReadContext& context, Campaign& campaign) {
   ReadLimitsOf(model, program.limits);
   ReadHeldEffects(model, context.is_new(), "the program of the campaign", campaign.model);
   ReadNumerics(model, program);
-  ReadNext(model);
+  model.Ignore({"next"});  // read behind the experiments
   if (model.Has("command")) CheckCommand(model, context, program);
   if (program.persistent && program.states) {
     model.Problem("states",
@@ -292,7 +322,11 @@ void CheckProgram(const MapReader& campaign_map, const Campaign& campaign) {
                                         "} stands for what the worker says; call it another"));
     }
   }
-  for (const Experiment& experiment : campaign.experiments) {
+  CheckNumerics(campaign_map, campaign, parameters);
+  for (const auto& [name, choice] : campaign.program->numerics) parameters.insert(name);
+  std::vector<Experiment> experiments = campaign.experiments;
+  experiments.insert(experiments.end(), campaign.next.begin(), campaign.next.end());
+  for (const Experiment& experiment : experiments) {
     std::set<std::string> told;
     for (const auto& [name, value] : experiment.told) told.insert(name);
     for (const Specimen& specimen : experiment.specimens) {

@@ -1,5 +1,8 @@
 #include "server/campaign/file/shared/read_context.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include "absl/strings/str_cat.h"
 #include "server/campaign/file/text/suggestion.h"
 
@@ -28,6 +31,27 @@ void ReadContext::AddTableProblems(const std::string& path,
   for (const TableProblem& problem : found) {
     problems_.AddIn(path, problem.line, problem.column, problem.message, problem.kind);
   }
+}
+
+bool IsShortWord(const std::string& name) {
+  const auto plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
+  };
+  constexpr std::size_t kLongest = 64;
+  return !name.empty() && name.size() <= kLongest && std::all_of(name.begin(), name.end(), plain);
+}
+
+std::string ReadShortName(MapReader& map, bool is_new) {
+  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+  if (map.Has("name") && !IsShortWord(name)) {
+    map.Problem("name",
+                absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
+  }
+  const unsigned char first = name.empty() ? 'a' : static_cast<unsigned char>(name.front());
+  if (is_new && std::isalnum(first) == 0 && first != '_') {  // a folder of this name: ..
+    map.Problem("name", absl::StrCat(Quoted(name), " has to begin with a letter, a digit or _"));
+  }
+  return name;
 }
 
 }  // namespace calib::campaign

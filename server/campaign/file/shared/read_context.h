@@ -56,4 +56,12 @@ class ReadContext {
   std::vector<std::string> files_;
 };
 
+/// Whether it is one to 64 letters, digits and _ - . +, as stands in tables, file names and on the
+/// command line.
+bool IsShortWord(const std::string& name);
+
+/// The key `name` of an experiment, which stands in tables, file names and on the command line.
+/// is_new: as ReadContext.
+std::string ReadShortName(MapReader& map, bool is_new);
+
 }  // namespace calib::campaign

@@ -65,6 +65,7 @@ void ProgramsTest::Bring(v1::ProgramRun& run, const std::string& name, const std
 
 Programs& ProgramsTest::TheseMay(std::vector<std::string> allowed) {
   programs_ = std::make_unique<Programs>(ProgramsOptions{.fetch = contents_.AsFetch(),
+                                                         .put = put_,
                                                          .scratch = folder_.path() + "/scratch",
                                                          .allowed = std::move(allowed),
                                                          .slots = slots_,

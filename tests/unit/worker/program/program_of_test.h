@@ -65,6 +65,7 @@ class ProgramsTest : public ::testing::Test {
                       .grace = std::chrono::milliseconds(500),
                       .between_walks = std::chrono::milliseconds(50)};
   int slots_ = 1;
+  Put put_{};  ///< empty: files of a run go
   std::int64_t attempt_ = 0;
   std::unique_ptr<Programs> programs_;
 };

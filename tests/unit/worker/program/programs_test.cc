@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "proto/rpc/digest.h"
 #include "tests/unit/worker/program/program_of_test.h"
 
 namespace calib::worker {
@@ -25,6 +26,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::Pair;
 using ::testing::StartsWith;
 
 /// A stop after so long.
@@ -372,8 +374,50 @@ TEST_F(ProgramsTest, FilesStayWithARun) {
   EXPECT_EQ(outcome.report.kept[0].name, "d/a");
   EXPECT_EQ(outcome.report.kept[0].content, "one\n");
   EXPECT_THAT(outcome.report.not_kept,
-              ElementsAre("missing is not there", "pipe is no regular file",
-                          HasSubstr("../up is no name")));
+              ElementsAre(Pair("../up", HasSubstr("is no name")), Pair("missing", "is not there"),
+                          Pair("pipe", "is no regular file")));
+  EXPECT_EQ(outcome.finished.kept_size(), 0) << "nobody takes them";
+}
+
+TEST_F(ProgramsTest, FilesAreHandedOverAndWhatIsNotTakenIsNoFailure) {
+  std::vector<std::string> put;
+  put_ = [&put](const std::string& content, const std::stop_token&) {
+    if (content.size() > 10) return absl::ResourceExhaustedError("too large");
+    put.push_back(content);
+    return absl::OkStatus();
+  };
+  v1::ProgramRun run =
+      Shell("echo one > a; echo one and two and three > b\n" + Answers(0, 3) + "exit 1");
+  for (const char* name : {"a", "b", "missing"}) run.add_keep(name);
+  const v1::Finished finished = Evaluate(run).finished;
+  EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_COMPLETED) << finished.reason();
+  EXPECT_THAT(put, ElementsAre("one\n"));
+  ASSERT_EQ(finished.kept_size(), 3);
+  EXPECT_EQ(finished.kept(0).digest(), rpc::Sha256Hex("one\n"));
+  EXPECT_THAT(finished.kept(0).reason(), IsEmpty());
+  EXPECT_THAT(finished.kept(1).digest(), IsEmpty());
+  EXPECT_THAT(finished.kept(1).reason(), HasSubstr("too large"));
+  EXPECT_EQ(finished.kept(2).reason(), "is not there");
+}
+
+TEST_F(ProgramsTest, WhatAnEarlierRunHasLeftDoesNotStayWithTheNext) {
+  v1::ProgramRun run = Python(R"(
+import json, os, sys
+for n, line in enumerate(sys.stdin):
+    request = json.loads(line)
+    if n == 0:
+        open('a', 'w').write('first')
+    for k in range(3):
+        print(json.dumps({'run': request['run'], 'load_step': k, 'y': 0}))
+    print(json.dumps({'run': request['run'], 'end': 'complete'}))
+)");
+  run.set_persistent(true);
+  run.add_keep("a");
+  EXPECT_EQ(Evaluate(run).report.kept.size(), 1U);
+  const Outcome second = Evaluate(run);
+  EXPECT_EQ(second.finished.outcome(), v1::Finished::OUTCOME_COMPLETED) << second.finished.reason();
+  EXPECT_THAT(second.report.kept, IsEmpty());
+  EXPECT_THAT(second.report.not_kept, ElementsAre(Pair("a", "is not there")));
 }
 
 TEST_F(ProgramsTest, InputStaysOpenWhereCheckpointsAreUnderstood) {

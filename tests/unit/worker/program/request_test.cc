@@ -44,6 +44,13 @@ TEST(ProgramRequest, HoldsWhatTheProtocolSays) {
   EXPECT_EQ(RequestText(Example(), "17"), text);
 }
 
+TEST(ProgramRequest, TheTestOfTheExperimentIsNamedWhereItHasOne) {
+  EXPECT_FALSE(nlohmann::json::parse(*RequestText(Example(), "1")).contains("test"));
+  v1::ProgramRun run = Example();
+  run.set_test("triaxial_drained");
+  EXPECT_EQ(nlohmann::json::parse(*RequestText(run, "1")).at("test"), "triaxial_drained");
+}
+
 TEST(ProgramRequest, WithoutSettings) {
   v1::ProgramRun run = Example();
   run.set_settings("");
