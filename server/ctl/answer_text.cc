@@ -64,8 +64,8 @@ std::string ParametersText(const v1::Posterior& posterior, bool nuisance) {
   report::TextTable table({nuisance ? "<nuisance" : "<parameter", "mean", "± sd", "cov", "5 %",
                            "50 %", "95 %", "<unit", "<"});
   bool any = false;
-  for (const auto& p : posterior.parameters()) {
-    if (p.nuisance() != nuisance) continue;
+  const auto add = [&](const v1::Posterior::Parameter& p) {
+    if (p.nuisance() != nuisance || campaign::IsScoreName(p.name())) return;
     any = true;
     const report::DisplayUnit unit = report::UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
     const auto shown = [&unit](double value, int digits) {
@@ -76,7 +76,9 @@ std::string ParametersText(const v1::Posterior& posterior, bool nuisance) {
                   p.conditioned_on() ? "held (conditioned on)"
                   : p.at_bound()     ? "at a bound of the prior"
                                      : ""});
-  }
+  };
+  for (const auto& p : posterior.parameters()) add(p);
+  for (const auto& p : posterior.members()) add(p);
   return any ? table.ToString() : "";
 }
 

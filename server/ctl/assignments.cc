@@ -64,7 +64,9 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
   const auto calibrated = std::find_if(
       campaign.parameters.begin(), campaign.parameters.end(),
       [&name](const campaign::CalibratedParameter& parameter) { return parameter.name == name; });
-  const bool is_setting = calibrated != campaign.parameters.end() && calibrated->setting;
+  const bool of_population = calibrated != campaign.parameters.end() && calibrated->of_population;
+  const bool is_setting =
+      calibrated != campaign.parameters.end() && (calibrated->setting || of_population);
   const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
   if (info == nullptr && !is_setting) {
     return absl::StrCat("--set ", name, ": the model has no such parameter; ",
@@ -75,8 +77,9 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
       is_setting ? calibrated->unit : dem::UnitFor(*info, campaign.model.contact);
   const auto value = campaign::ParseQuantity(assignment.substr(equals + 1), unit);
   if (!value.ok()) return absl::StrCat("--set ", name, ": ", std::string(value.status().message()));
-  const campaign::Range range =
-      is_setting ? calibrated->setting->range : campaign::AdmissibleRange(*info);
+  const campaign::Range range = of_population ? campaign::Range{.min = calibrated->prior.min}
+                                : is_setting  ? calibrated->setting->range
+                                              : campaign::AdmissibleRange(*info);
   if (!range.Contains(*value)) {
     return absl::StrCat("--set ", name, ": ", Quoted(assignment.substr(equals + 1)),
                         " is outside what is allowed: ", range.Describe(unit));
@@ -103,6 +106,10 @@ absl::StatusOr<std::vector<double>> ApplyAssignments(const std::vector<std::stri
     const auto value = values.find(parameter.name);
     if (value == values.end()) {
       if (refused.contains(parameter.name)) continue;
+      if (parameter.of_population) {  // as in a sample whose labels all have the common value
+        calibrated.push_back(0);
+        continue;
+      }
       if (campaign.program) {  // a dry run does with any
         calibrated.push_back(parameter.prior.Quantile(0.5));
         continue;

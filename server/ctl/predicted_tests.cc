@@ -193,6 +193,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
                         .lineage = {.parent = parent.status.campaign(),
                                     .purpose = ToString(campaign::DerivedFor::kPrediction)},
                         .experiments = tests.experiments,
+                        .new_labels = true,
                         .rows = {{.like = 0, .values = [&parent] {
                                     std::map<std::string, double> values;
                                     for (const auto& p : parent.campaign.parameters) {
@@ -226,6 +227,15 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
   if (!lines.empty()) return absl::InvalidArgumentError(absl::StrJoin(lines, "\n"));
   for (const campaign::Experiment& e : outcome.campaign.experiments) {
     for (const campaign::MeasuredObservable& o : e.observables) tests.observables[o.name] = o.unit;
+  }
+  const auto& populations = parent.campaign.populations;
+  for (std::size_t p = 0; p < populations.size(); ++p) {
+    const std::vector<std::string>& known = populations[p].labels;
+    for (const std::string& label : outcome.campaign.populations[p].labels) {
+      if (std::find(known.begin(), known.end(), label) == known.end()) {
+        tests.unseen.push_back({.population = p, .label = label});
+      }
+    }
   }
   return tests;
 }

@@ -13,11 +13,18 @@
 
 namespace calib::ctl {
 
+/// A label of a parameter per experiment or batch that no experiment of the campaign has.
+struct UnseenLabel {
+  std::size_t population = 0;  ///< index in Campaign::populations
+  std::string label;
+};
+
 /// The tests to predict as a list of experiments, with the files they name.
 struct PredictedTests {
   std::vector<campaign::YamlNode> experiments;
   std::map<std::string, std::string> files;        ///< path as written -> content
   std::map<std::string, std::string> observables;  ///< that any of the tests has, and SI units
+  std::vector<UnseenLabel> unseen;
 };
 
 /// Gives an experiment without `packing` that of another one, with its `realizations` and, where it

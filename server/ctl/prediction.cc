@@ -67,6 +67,29 @@ Draws DrawsOf(const report::CampaignView& parent, int wanted) {
   return draws;
 }
 
+// For each draw the scores of labels that the tests have and the campaign lacks, by name: draws
+// from the population of that draw, within its bounds.
+std::vector<std::map<std::string, double>> DrawUnseen(const campaign::Campaign& campaign,
+                                                      const PredictedTests& tests,
+                                                      const Draws& draws) {
+  std::vector<std::map<std::string, double>> all(static_cast<std::size_t>(draws.parameters.rows()));
+  for (std::size_t k = 0; k < tests.unseen.size(); ++k) {
+    const campaign::Population& population = campaign.populations[tests.unseen[k].population];
+    const std::string score = campaign::ScoreName(population.name, tests.unseen[k].label);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      inference::PhiloxStream stream({.seed = campaign.seed,
+                                      .purpose = inference::StreamPurpose::kUnseenMember,
+                                      .iteration = k,
+                                      .sample = i});
+      const auto row = static_cast<Index>(i);
+      const double common = draws.parameters(row, static_cast<Index>(population.common));
+      const double spread = draws.parameters(row, static_cast<Index>(population.spread));
+      all[i][score] = campaign::DrawScore(population, common, spread, stream);
+    }
+  }
+  return all;
+}
+
 struct Level {
   std::string observable;
   double value = 0;
@@ -116,14 +139,30 @@ struct RunsOfObservable {
   Eigen::MatrixXd parameters, values;
 };
 
+// Places of the parameters that an experiment's runs read: of a population the common one, where
+// ValuesIn() puts the value of the experiment's label.
+std::vector<std::size_t> ReadByRuns(const campaign::Campaign& campaign) {
+  std::vector<std::size_t> places;
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    if (!campaign.parameters[j].of_population) places.push_back(j);
+  }
+  return places;
+}
+
 RunsOfObservable Collect(const report::CampaignView& view, const campaign::Experiment& experiment,
                          const std::string& observable) {
   const auto t = static_cast<Index>(experiment.control.size());
-  const auto d = static_cast<Index>(view.campaign.parameters.size());
+  const std::vector<std::size_t> read = ReadByRuns(view.campaign);
+  const auto d = static_cast<Index>(read.size());
   RunsOfObservable runs{.parameters = Eigen::MatrixXd(0, d), .values = Eigen::MatrixXd(0, t)};
   for (const v1::Sample& sample : view.samples) {
     const auto found = view.states.find({experiment.name, sample.index()});
-    if (found == view.states.end() || sample.parameters_size() != d) continue;
+    if (found == view.states.end() ||
+        sample.parameters_size() != static_cast<int>(view.campaign.parameters.size())) {
+      continue;
+    }
+    const std::vector<double> own = campaign::ValuesIn(
+        view.campaign, experiment, {sample.parameters().data(), view.campaign.parameters.size()});
     const auto& names = found->second.observables;
     const auto at = std::find(names.begin(), names.end(), observable) - names.begin();
     Eigen::RowVectorXd row = Eigen::RowVectorXd::Constant(t, std::nan(""));
@@ -136,9 +175,9 @@ RunsOfObservable Collect(const report::CampaignView& view, const campaign::Exper
     runs.parameters.conservativeResize(runs.parameters.rows() + 1, d);
     runs.values.conservativeResize(runs.values.rows() + 1, t);
     for (Index j = 0; j < d; ++j) {
-      const auto index = static_cast<std::size_t>(j);
+      const std::size_t place = read[static_cast<std::size_t>(j)];
       runs.parameters(runs.parameters.rows() - 1, j) =
-          view.campaign.parameters[index].prior.ToStandard(sample.parameters(static_cast<int>(j)));
+          view.campaign.parameters[place].prior.ToStandard(own[place]);
     }
     runs.values.row(runs.values.rows() - 1) = row;
   }
@@ -313,9 +352,13 @@ absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
   campaign::Derivation derivation{
       .name = absl::StrCat(parent.campaign.name, ": prediction"),
       .lineage = {.parent = id, .purpose = ToString(campaign::DerivedFor::kPrediction)},
-      .experiments = tests.experiments};
+      .experiments = tests.experiments,
+      .new_labels = true};
+  const std::vector<std::map<std::string, double>> unseen =
+      DrawUnseen(parent.campaign, tests, draws);
   for (Index i = 0; i < draws.parameters.rows(); ++i) {
-    campaign::Derivation::Row row{.like = draws.like[static_cast<std::size_t>(i)], .values = {}};
+    const auto number = static_cast<std::size_t>(i);
+    campaign::Derivation::Row row{.like = draws.like[number], .values = unseen[number]};
     for (std::size_t j = 0; j < parent.campaign.parameters.size(); ++j) {
       row.values[parent.campaign.parameters[j].name] = draws.parameters(i, static_cast<Index>(j));
     }
@@ -334,6 +377,12 @@ absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
     RETURN_IF_ERROR(AddExperiment(view, experiment, levels, misfit, prediction));
   }
   AddNotes(view, misfit, prediction);
+  for (const UnseenLabel& label : tests.unseen) {
+    const std::string& name = parent.campaign.populations[label.population].name;
+    prediction.notes.push_back(absl::StrCat(campaign::MemberName(name, label.label),
+                                            " was not fitted: each run draws it ",
+                                            "from the population of ", name, "."));
+  }
   return prediction;
 }
 

@@ -41,8 +41,11 @@ class PriorsInExtension {
  public:
   PriorsInExtension(const report::CampaignView& parent, const std::vector<std::string>& effects)
       : joining_(PriorsOfAll(parent, effects)) {
-    for (const campaign::CalibratedParameter& own : parent.campaign.parameters)
+    for (const campaign::CalibratedParameter& own : parent.campaign.parameters) {
       base_.emplace(own.name, own.prior);
+      order_.push_back(own.name);
+    }
+    prior_ = campaign::Priors(parent.campaign);
   }
   std::size_t size() const { return base_.size() + joining_.size(); }
   bool Has(const std::string& name) const {
@@ -55,13 +58,23 @@ class PriorsInExtension {
     return joins != joining_.end() && joins->second.min <= value && value <= joins->second.max;
   }
   bool AreInside(const std::map<std::string, double>& values) const {
-    return values.size() == size() && std::all_of(values.begin(), values.end(), [&](const auto& v) {
-             return IsInside(v.first, v.second);
-           });
+    const bool each = values.size() == size() &&
+                      std::all_of(values.begin(), values.end(),
+                                  [&](const auto& v) { return IsInside(v.first, v.second); });
+    if (!each || !prior_.is_constrained()) return each;
+    Eigen::VectorXd base(static_cast<Eigen::Index>(order_.size()));
+    for (std::size_t j = 0; j < order_.size(); ++j) {
+      const auto known = values.find(order_[j]);
+      if (known == values.end()) return false;
+      base[static_cast<Eigen::Index>(j)] = known->second;
+    }
+    return prior_.MeetsConstraints(base);
   }
 
  private:
   std::map<std::string, inference::Prior> base_;
+  std::vector<std::string> order_;  // of these in the parent
+  inference::JointPrior prior_;     // of them
   std::map<std::string, dem::DefaultPrior> joining_;
 };
 

@@ -9,6 +9,7 @@
 #include "calib/return_if_error.h"
 #include "inference/emulator/search_widening.h"
 #include "inference/emulator/split_half.h"
+#include "inference/filter/parameter_summary.h"
 #include "inference/filter/widened_posterior.h"
 #include "server/scheduler/stage_misfit.h"
 
@@ -52,7 +53,64 @@ void ExplainEmulator(const Answer& answer, std::vector<std::string>& warnings) {
   }
 }
 
+std::vector<inference::ParameterSummary> MeansAlone(
+    std::vector<inference::ParameterSummary> means) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (inference::ParameterSummary& mean : means) {
+    mean.sd = mean.cov = mean.q05 = mean.q50 = mean.q95 = kNone;
+  }
+  return means;
+}
+
+std::vector<inference::ParameterSummary> MembersOfWeights(
+    const campaign::Campaign& campaign, std::span<const inference::Iteration> iterations,
+    const Eigen::VectorXd& log_weights) {
+  if (campaign.populations.empty()) return {};
+  Eigen::MatrixXd samples(log_weights.size(),
+                          static_cast<Eigen::Index>(campaign.parameters.size()));
+  Eigen::Index row = 0;
+  for (const inference::Iteration& iteration : iterations) {
+    samples.middleRows(row, iteration.parameters.rows()) = iteration.parameters;
+    row += iteration.parameters.rows();
+  }
+  return SummarizeMembers(campaign, samples, log_weights);
+}
+
+// About the means, which stay.
+void Widen(double factor, std::vector<inference::ParameterSummary>& members) {
+  for (inference::ParameterSummary& one : members) {
+    for (double* quantile : {&one.q05, &one.q50, &one.q95})
+      *quantile = one.mean + factor * (*quantile - one.mean);
+    one.sd *= factor;
+    one.cov *= factor;
+  }
+}
+
 }  // namespace
+
+std::vector<inference::ParameterSummary> SummarizeMembers(const campaign::Campaign& campaign,
+                                                          const Eigen::MatrixXd& draws,
+                                                          const Eigen::VectorXd& log_weights) {
+  std::vector<inference::ParameterSummary> members;
+  // The value of a label has no prior of its own that it could be at a bound of.
+  const inference::Prior unbounded{.kind = inference::PriorKind::kNormal};
+  for (const campaign::Population& population : campaign.populations) {
+    const auto common = draws.col(static_cast<Eigen::Index>(population.common));
+    const auto spread = draws.col(static_cast<Eigen::Index>(population.spread));
+    for (const std::size_t score : population.scores) {
+      const Eigen::VectorXd values =
+          common.array() + spread.array() * draws.col(static_cast<Eigen::Index>(score)).array();
+      members.push_back(inference::Summarize(unbounded, log_weights, values));
+    }
+  }
+  return members;
+}
+
+std::vector<inference::ParameterSummary> SummarizeMembers(const campaign::Campaign& campaign,
+                                                          const Eigen::MatrixXd& draws) {
+  const auto n = static_cast<double>(draws.rows());
+  return SummarizeMembers(campaign, draws, Eigen::VectorXd::Constant(draws.rows(), -std::log(n)));
+}
 
 std::vector<inference::ParameterSummary> Answer::Parameters() const {
   if (FromEmulator()) {
@@ -61,12 +119,12 @@ std::vector<inference::ParameterSummary> Answer::Parameters() const {
   if (FromWeights()) {
     return weighted.parameters;
   }
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  std::vector<inference::ParameterSummary> means = weighted.parameters;
-  for (inference::ParameterSummary& mean : means) {
-    mean.sd = mean.cov = mean.q05 = mean.q50 = mean.q95 = kNone;
-  }
-  return means;
+  return MeansAlone(weighted.parameters);
+}
+
+std::vector<inference::ParameterSummary> Answer::Members(const campaign::Campaign& campaign) const {
+  if (FromEmulator()) return SummarizeMembers(campaign, emulated->draws);
+  return FromWeights() ? weighted_members : MeansAlone(weighted_members);
 }
 
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
@@ -182,6 +240,8 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
                                                               iterations, definition.known));
   Answer answer;
   answer.weighted = std::move(weighted);
+  answer.weighted_members =
+      MembersOfWeights(definition.campaign, iterations, answer.weighted.log_weights);
   answer.warnings = answer.weighted.warnings;
   if (std::string held = ConditionedOn(definition, answer.weighted.frozen); !held.empty()) {
     answer.warnings.insert(answer.warnings.begin(), std::move(held));
@@ -200,6 +260,7 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
     const double widened =
         inference::WidenByRefits(definition.priors, definition.data, *definition.replicates,
                                  iterations, definition.campaign.filter.seed, answer.weighted);
+    Widen(widened, answer.weighted_members);  // by the largest factor of a parameter
     if (widened > kWorthSaying) {
       answer.warnings.push_back(absl::StrFormat(
           "Fits to one packing or another differ by more than the errors say: the intervals are "

@@ -19,6 +19,8 @@ struct Answer {
   inference::Posterior weighted;
   const char* weights_source = "weights";  ///< what `weighted` comes from: weights or tmcmc
   Eigen::MatrixXd draws;                   ///< equally weighted, of tmcmc; else empty
+  /// SummarizeMembers() of what `weighted` is of.
+  std::vector<inference::ParameterSummary> weighted_members{};
   /// Where the weights do not suffice and the states could be emulated, adequately or not.
   std::optional<inference::EmulatedResult> emulated;
   std::vector<ObservableScatter> scatter;  ///< what runs on other packings differ by, where known
@@ -32,7 +34,20 @@ struct Answer {
   /// Summaries of the posterior that is reported. Without intervals: the weighted means, everything
   /// else NaN.
   std::vector<inference::ParameterSummary> Parameters() const;
+  /// The same of the values of labels.
+  std::vector<inference::ParameterSummary> Members(const campaign::Campaign& campaign) const;
 };
+
+/// Summaries of the values that parameters per experiment or batch have for each label
+/// (campaign/model/population.h), population by population, in the order of their labels; none
+/// where there are no populations. draws: n x d in the order of Campaign::parameters, SI;
+/// log_weights: n, of weights that sum to one. Pure.
+std::vector<inference::ParameterSummary> SummarizeMembers(const campaign::Campaign& campaign,
+                                                          const Eigen::MatrixXd& draws,
+                                                          const Eigen::VectorXd& log_weights);
+/// The same of equally weighted draws.
+std::vector<inference::ParameterSummary> SummarizeMembers(const campaign::Campaign& campaign,
+                                                          const Eigen::MatrixXd& draws);
 
 /// Adds to the answer what an emulator of the runs gives, and the warnings that go with it.
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,

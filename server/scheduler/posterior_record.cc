@@ -20,6 +20,15 @@ namespace {
 constexpr double kTail = 1e-3;  // shown as the range of an unbounded prior
 constexpr Eigen::Index kDraws = 400;
 
+void SetSummary(const inference::ParameterSummary& summary, v1::Posterior::Parameter& out) {
+  out.set_mean(summary.mean);
+  out.set_sd(summary.sd);
+  out.set_cov(summary.cov);
+  out.set_q05(summary.q05);
+  out.set_q50(summary.q50);
+  out.set_q95(summary.q95);
+}
+
 void AddParameters(const Definition& definition, const Answer& answer, v1::Posterior& message) {
   const std::vector<inference::ParameterSummary> summaries = answer.Parameters();
   for (std::size_t i = 0; i < summaries.size(); ++i) {
@@ -29,12 +38,7 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
     v1::Posterior::Parameter& out = *message.add_parameters();
     out.set_name(parameter.name);
     out.set_unit(parameter.unit);
-    out.set_mean(summary.mean);
-    out.set_sd(summary.sd);
-    out.set_cov(summary.cov);
-    out.set_q05(summary.q05);
-    out.set_q50(summary.q50);
-    out.set_q95(summary.q95);
+    SetSummary(summary, out);
     out.set_at_bound(summary.at_bound);
     out.set_nuisance(parameter.nuisance);
     const auto& frozen = answer.weighted.frozen;
@@ -46,6 +50,24 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
                            : std::numeric_limits<double>::quiet_NaN());
     out.set_prior_min(std::isfinite(prior.min) ? prior.min : prior.Quantile(kTail));
     out.set_prior_max(std::isfinite(prior.max) ? prior.max : prior.Quantile(1 - kTail));
+  }
+}
+
+void AddMembers(const campaign::Campaign& campaign, const Answer& answer, v1::Posterior& message) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<inference::ParameterSummary> summaries = answer.Members(campaign);
+  auto summary = summaries.begin();
+  for (const campaign::Population& population : campaign.populations) {
+    for (const std::string& label : population.labels) {
+      v1::Posterior::Parameter& out = *message.add_members();
+      out.set_name(campaign::MemberName(population.name, label));
+      out.set_unit(population.unit);
+      SetSummary(*summary++, out);
+      out.set_nuisance(campaign.parameters[population.common].nuisance);
+      out.set_split_half(kNone);
+      out.set_prior_min(kNone);
+      out.set_prior_max(kNone);
+    }
   }
 }
 
@@ -247,6 +269,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
     message.set_sigma(*posterior.sigma);
   }
   AddParameters(definition, answer, message);
+  AddMembers(definition.campaign, answer, message);
   if (answer.HasIntervals()) {
     const Eigen::MatrixXd& correlation =
         emulated ? answer.emulated->correlation : posterior.correlation;

@@ -420,6 +420,9 @@ class SurrogateMethod final : public Method {
       posterior.parameters.push_back(
           {.mean = value, .sd = kNone, .cov = kNone, .q05 = kNone, .q50 = kNone, .q95 = kNone});
     }
+    answer.weighted_members = SummarizeMembers(
+        campaign_,
+        Eigen::Map<const Eigen::RowVectorXd>(best.data(), static_cast<Eigen::Index>(best.size())));
     posterior.log_evidence = posterior.log_evidence_se = posterior.pareto_k = kNone;
     posterior.ess = 1;
     posterior.degeneracy = "An optimiser looks for the best fit and gives no posterior by itself.";

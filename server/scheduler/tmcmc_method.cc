@@ -182,6 +182,7 @@ class TmcmcMethod final : public Method {
       posterior.parameters.push_back(inference::Summarize(
           definition_.priors[j], equal, state.samples.col(static_cast<Eigen::Index>(j))));
     }
+    answer.weighted_members = SummarizeMembers(definition_.campaign, state.samples);
     const Eigen::VectorXd mean = inference::WeightedMean(equal, state.samples);
     posterior.correlation =
         inference::CorrelationOf(inference::WeightedCovariance(equal, state.samples, mean));

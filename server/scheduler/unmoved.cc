@@ -64,6 +64,7 @@ std::string UnmovedParameters(const Definition& definition, const Answer& answer
   const std::vector<inference::ParameterSummary> summaries = answer.Parameters();
   std::vector<std::string> names;
   for (std::size_t i = 0; i < summaries.size(); ++i) {
+    if (definition.campaign.parameters[i].of_population) continue;  // unfitted labels have scores
     const auto same = [&](double quantile, double share) {
       const double by_chance = 2 * std::sqrt(share * (1 - share) / samples);
       return std::abs(StandardNormalCdf(priors[i].NormalScore(quantile)) - share) <=

@@ -63,10 +63,12 @@ std::string StatesCsv(const CampaignView& view) {
 
 std::string PosteriorCsv(const v1::Posterior& posterior) {
   std::string csv = "parameter,unit,mean,sd,cov,q05,q50,q95,at_bound\n";
-  for (const auto& p : posterior.parameters()) {
-    csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", p.name(), p.unit(), Cell(p.mean()),
-                       Cell(p.sd()), Cell(p.cov()), Cell(p.q05()), Cell(p.q50()), Cell(p.q95()),
-                       p.at_bound());
+  for (const auto* list : {&posterior.parameters(), &posterior.members()}) {
+    for (const auto& p : *list) {
+      csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", p.name(), p.unit(), Cell(p.mean()),
+                         Cell(p.sd()), Cell(p.cov()), Cell(p.q05()), Cell(p.q50()), Cell(p.q95()),
+                         p.at_bound());
+    }
   }
   return csv;
 }

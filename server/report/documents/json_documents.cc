@@ -155,7 +155,7 @@ Json PosteriorFields(const v1::Posterior& p,
     }
     return shown;
   };
-  for (const auto& q : p.parameters()) {
+  const auto add = [&](const v1::Posterior::Parameter& q, bool is_member) {
     (q.nuisance() ? nuisance : parameters)[q.name()] = {
         {"mean", q.mean()},
         {"sd", q.sd()},
@@ -165,12 +165,20 @@ Json PosteriorFields(const v1::Posterior& p,
         {"q95", q.q95()},
         {"unit", q.unit()},
         {"at_bound", q.at_bound()},
-        {"prior_min", bound(q.name(), &inference::Prior::min, q.prior_min())},
-        {"prior_max", bound(q.name(), &inference::Prior::max, q.prior_max())},
+        {"prior_min",
+         is_member ? Json(nullptr) : bound(q.name(), &inference::Prior::min, q.prior_min())},
+        {"prior_max",
+         is_member ? Json(nullptr) : bound(q.name(), &inference::Prior::max, q.prior_max())},
         {"conditioned_on", q.conditioned_on()},
         {"split_half", q.split_half()},
         {"prior_density", nullptr},
         {"density", nullptr}};
+  };
+  for (const auto& q : p.parameters()) add(q, false);
+  // Behind the others, which have places in correlation and path.
+  for (const auto& q : p.members()) {
+    add(q, true);
+    (q.nuisance() ? nuisance : parameters)[q.name()]["member"] = true;
   }
   for (std::size_t j = 0; j < shape.parameters.size(); ++j) {
     const std::string& name = shape.parameters[j];

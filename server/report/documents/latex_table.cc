@@ -45,8 +45,8 @@ std::string Cell(double value, int digits) {
 
 std::string LatexTable(const CampaignView& view) {
   std::string rows;
-  for (const auto& p : view.posterior.parameters()) {
-    if (p.conditioned_on() || p.nuisance()) continue;
+  const auto add = [&rows](const v1::Posterior::Parameter& p) {
+    if (p.conditioned_on() || p.nuisance()) return;
     const DisplayUnit unit = UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
     const auto cell = [&unit](double value, int digits) {
       return Cell(value * unit.factor, digits);
@@ -54,7 +54,9 @@ std::string LatexTable(const CampaignView& view) {
     rows += fmt::format("{} & {} & {} & {} & {} & {} & {} \\\\\n", Tex(NameForPeople(p.name())),
                         unit.label.empty() ? "--" : Tex(unit.label), cell(p.mean(), 4),
                         cell(p.sd(), 2), cell(p.q05(), 3), cell(p.q50(), 3), cell(p.q95(), 3));
-  }
+  };
+  for (const auto& p : view.posterior.parameters()) add(p);
+  for (const auto& p : view.posterior.members()) add(p);
   if (rows.empty()) return "";
   return "% \\usepackage{booktabs}\n\\begin{table}\n\\centering\n\\caption{Posterior of " +
          Tex(view.campaign.name) +

@@ -56,6 +56,17 @@ std::string PriorInWords(const campaign::CalibratedParameter& p) {
   return bounds;
 }
 
+std::string PopulationSentence(const campaign::Campaign& campaign,
+                               const campaign::Population& population) {
+  const campaign::CalibratedParameter& spread = campaign.parameters[population.spread];
+  return fmt::format(
+      "{} has a value for each {} ({}), normally distributed about this common one; the prior of "
+      "the standard deviation is half normal, of sd {}.",
+      NameForPeople(population.name), campaign::WordOf(campaign::kPerWords, population.per),
+      Listed(population.labels),
+      NumberWithUnit(spread.prior.sd, population.name, population.unit, 4));
+}
+
 std::string ModelSentence(const campaign::Campaign& campaign, Citations& cited) {
   if (campaign.precomputed) {
     return fmt::format("The model was known by {} runs made beforehand.",
@@ -197,10 +208,14 @@ Methods MethodsOf(const CampaignView& view) {
   say(ModelSentence(campaign, cited));
   std::vector<std::string> priors;
   for (const auto& p : campaign.parameters) {
+    if (p.of_population) continue;
     priors.push_back(NameForPeople(p.name) + " (" + PriorInWords(p) +
                      (p.nuisance ? "; nuisance)" : ")"));
   }
   if (!priors.empty()) say("Calibrated, with these priors: " + Listed(priors) + ".");
+  for (const campaign::Population& population : campaign.populations) {
+    say(PopulationSentence(campaign, population));
+  }
   std::vector<std::string> tied;
   for (const auto& t : campaign.tied) tied.push_back(NameForPeople(t.name) + " = " + t.text);
   if (!tied.empty()) say("Tied to others: " + Listed(tied) + ".");

@@ -238,7 +238,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
   if (heldout.readings > 0) {
     comparison.heldout_rms_error = std::sqrt(heldout.squared / heldout.readings);
   }
-  const int degrees = fitted.readings - static_cast<int>(view.campaign.parameters.size());
+  const int degrees = fitted.readings - campaign::FreeParameters(view.campaign);
   if (judged && degrees > 0) {
     comparison.reduced_chi2 = fitted.chi2 / degrees;
     comparison.p_value = inference::UpperTail(fitted.chi2, degrees, fitted.known);

@@ -29,6 +29,23 @@ TEST(PosteriorText, SaysWhetherTheErrorOfTheEvidenceHoldsThatOfTheEmulator) {
               HasSubstr("of its sampling; the emulator's own error is not known"));
 }
 
+TEST(PosteriorText, HasTheValuesOfLabelsAndNotTheirScores) {
+  v1::Posterior posterior;
+  for (const char* name : {"k", "k.spread", "k@A.score"}) {
+    v1::Posterior::Parameter& p = *posterior.add_parameters();
+    p.set_name(name);
+    p.set_nuisance(std::string(name) == "k@A.score");
+  }
+  v1::Posterior::Parameter& member = *posterior.add_members();
+  member.set_name("k@A");
+  member.set_mean(4.75);
+  const std::string text = PosteriorText(posterior, {});
+  EXPECT_THAT(text, HasSubstr("k.spread"));
+  EXPECT_THAT(text, HasSubstr("k@A"));
+  EXPECT_THAT(text, HasSubstr("4.75"));
+  EXPECT_THAT(text, Not(HasSubstr("score")));
+}
+
 TEST(TableText, SaysWhatRanAndThatNothingWasInferred) {
   v1::CampaignStatus status;
   status.set_campaign("c3");

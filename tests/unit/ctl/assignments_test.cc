@@ -32,6 +32,28 @@ TEST(Assignments, TakeUnitsAndFixedParameters) {
   EXPECT_DOUBLE_EQ(c.model.parameters.at("poisson_ratio"), 0.3);
 }
 
+TEST(Assignments, LabelsHaveTheCommonValueUnlessTheirScoresAreGiven) {
+  campaign::Campaign c = Model();
+  const inference::Prior half{.kind = inference::PriorKind::kNormal, .min = 0};
+  const inference::Prior normal{.kind = inference::PriorKind::kNormal};
+  c.parameters.push_back(
+      {.name = "friction_coefficient.spread", .unit = "1", .prior = half, .of_population = true});
+  c.parameters.push_back({.name = "friction_coefficient@A.score",
+                          .unit = "1",
+                          .prior = normal,
+                          .nuisance = true,
+                          .of_population = true});
+  const std::vector<std::string> common = {"friction_coefficient=0.5", "young_modulus=2 GPa"};
+  EXPECT_THAT(ApplyAssignments(common, c).value(), ElementsAre(2e9, 0.5, 0, 0));
+  std::vector<std::string> set = common;
+  set.emplace_back("friction_coefficient.spread=0.1");
+  set.emplace_back("friction_coefficient@A.score=-2");
+  EXPECT_THAT(ApplyAssignments(set, c).value(), ElementsAre(2e9, 0.5, 0.1, -2));
+  set[2] = "friction_coefficient.spread=-0.1";
+  EXPECT_THAT(std::string(ApplyAssignments(set, c).status().message()),
+              HasSubstr("outside what is allowed"));
+}
+
 TEST(Assignments, EveryMistakeHasItsLine) {
   EXPECT_EQ(Error({"friction_coefficient=0.5"}),
             "young_modulus is calibrated in this campaign and needs a value: --set "

@@ -46,6 +46,36 @@ TEST(Json, NuisanceParametersStandApartAndLast) {
   EXPECT_EQ(json["path"][0]["mean"], Json({1.0, 3.0, 2.0}));
 }
 
+TEST(Json, ValuesOfLabelsStandBehindTheParameters) {
+  v1::Posterior posterior;
+  for (const char* name : {"k", "k.spread", "k@A.score"}) {
+    v1::Posterior::Parameter& parameter = *posterior.add_parameters();
+    parameter.set_name(name);
+    parameter.set_nuisance(std::string(name) == "k@A.score");
+  }
+  v1::Posterior::Parameter& member = *posterior.add_members();
+  member.set_name("k@A");
+  member.set_unit("N/m");
+  member.set_mean(1.0 / 3.0);
+  member.set_sd(0.25);
+  const std::string text = PosteriorJson(posterior);
+  const Json json = Json::parse(text);
+  const Json& p = json["parameters"];
+  EXPECT_EQ(p.size(), 3U);
+  EXPECT_LT(text.find("\"k.spread\""), text.find("\"k@A\""));
+  for (const char* field : {"mean", "sd", "cov", "q05", "q50", "q95", "unit", "at_bound"}) {
+    EXPECT_TRUE(p["k@A"].contains(field)) << field;
+  }
+  EXPECT_EQ(p["k@A"]["mean"].get<double>(), 1.0 / 3.0);
+  EXPECT_EQ(p["k@A"]["unit"], "N/m");
+  EXPECT_EQ(p["k@A"]["at_bound"], false);
+  EXPECT_EQ(p["k@A"]["member"], true);
+  EXPECT_FALSE(p["k"].contains("member"));
+  EXPECT_TRUE(p["k@A"]["prior_min"].is_null());
+  EXPECT_TRUE(json["nuisance_parameters"].contains("k@A.score"));
+  EXPECT_NE(PosteriorCsv(posterior).find("k@A,N/m,0.333333"), std::string::npos);
+}
+
 TEST(Json, ABoundThatThePriorDoesNotHaveIsNull) {
   CampaignView view = testing::ExampleView("x");
   view.campaign.parameters[0].prior.max = HUGE_VAL;

@@ -72,6 +72,7 @@ export interface Parameter {
   prior_min: Maybe;
   prior_max: Maybe;
   conditioned_on: boolean;
+  member?: boolean; // the value of one label, which follows from others: none in correlation and path
   prior_density?: Density | null;
   density?: Density | null;
 }

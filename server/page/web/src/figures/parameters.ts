@@ -14,7 +14,7 @@ export interface NamedPosterior {
 /// Those that the first posterior has inferred.
 export function inferredParameters(posterior: Posterior): string[] {
   return Object.entries(posterior.parameters)
-    .filter(([, one]) => !one.conditioned_on)
+    .filter(([, one]) => !one.conditioned_on && one.member !== true)
     .map(([name]) => name);
 }
 
