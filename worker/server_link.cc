@@ -235,25 +235,26 @@ absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::
   v1::BlobRequest request;
   request.set_digest(digest);
   std::string content;
-  RETURN_IF_ERROR(Insist(stop, std::numeric_limits<int>::max(),
-                         [&](grpc::ClientContext& context) -> absl::Status {
-                           ASSIGN_OR_RETURN(const auto stub, impl_->OpenStub());
-                           const auto reader = stub->GetBlob(&context, request);
-                           rpc::BlobAssembler assembler;
-                           v1::BlobChunk chunk;
-                           absl::Status assembled;
-                           while (assembled.ok() && reader->Read(&chunk)) {
-                             assembled = rpc::CheckMessage(chunk);
-                             if (assembled.ok()) assembled = assembler.Add(chunk);
-                           }
-                           if (!assembled.ok()) {
-                             context.TryCancel();
-                             return assembled;
-                           }
-                           RETURN_IF_ERROR(rpc::FromGrpc(reader->Finish()));
-                           ASSIGN_OR_RETURN(content, assembler.Finish());
-                           return absl::OkStatus();
-                         }));
+  const auto fetch = [&](grpc::ClientContext& context) -> absl::Status {
+    ASSIGN_OR_RETURN(const auto stub, impl_->OpenStub());
+    const auto reader = stub->GetBlob(&context, request);
+    rpc::BlobAssembler assembler;
+    v1::BlobChunk chunk;
+    absl::Status assembled;
+    while (assembled.ok() && reader->Read(&chunk)) {
+      assembled = rpc::CheckMessage(chunk);
+      if (assembled.ok()) assembled = assembler.Add(chunk);
+    }
+    if (!assembled.ok()) {
+      context.TryCancel();
+      return assembled;
+    }
+    RETURN_IF_ERROR(rpc::FromGrpc(reader->Finish()));
+    ASSIGN_OR_RETURN(content, assembler.Finish());
+    return absl::OkStatus();
+  };
+  const absl::Status got = Insist(stop, std::numeric_limits<int>::max(), fetch);
+  if (!got.ok()) return got;
   return content;
 }
 
