@@ -63,7 +63,7 @@ struct Worker {
 
 class Link {
  public:
-  Link() : service_(server_.core()) {}
+  Link() : service_(server_.core(), ServiceUnderFuzz::Folder()) {}
   ~Link() {
     for (Worker& worker : workers_) End(worker, false);
     server_.Settle();

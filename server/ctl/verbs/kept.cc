@@ -81,9 +81,10 @@ absl::StatusOr<int> Kept(const CommonOptions& common, const KeptOptions& options
       ASSIGN_OR_RETURN(path, Copy(client, file, fs::path(options.output) / experiment));
     }
     files.push_back({{"experiment", experiment}, {"name", file.name()}});
-    files.back()["digest"] = file.digest().empty() ? nlohmann::ordered_json() : file.digest();
+    files.back()["digest"] =
+        file.digest().empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(file.digest());
     files.back()["reason"] = file.reason();
-    files.back()["file"] = path.empty() ? nlohmann::ordered_json() : path;
+    files.back()["file"] = path.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(path);
     if (common.json) continue;
     std::cout << experiment << ": " << file.name()
               << (file.digest().empty() ? absl::StrCat(" did not stay: ", file.reason())

@@ -4,7 +4,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr char kCode[] = R"(import json, os, sys
+constexpr char kKeepingCode[] = R"(import json, os, sys
 request = json.loads(sys.stdin.readline())
 os.mkdir("out")
 for k, at in enumerate(request["control"]["values"]):
@@ -32,7 +32,7 @@ seed: 3
 class ProgramFiles : public CalibctlFixture {};
 
 TEST_F(ProgramFiles, StayWithTheirRunsAndAreBrought) {
-  Write("code.py", kCode);
+  Write("code.py", kKeepingCode);
   Write("line.csv", "x,y\n1,2\n2,4.1\n3,5.9\n");
   Write("model.yaml", kCampaign);
   ASSERT_EQ(Call("run model.yaml --state s --workers 1 --json").code, 0) << Read("err");

@@ -7,7 +7,7 @@ namespace {
 
 // Creep and heat are one and the same at 300 K. The code knows its tests by their settings; what
 // chance makes of a specimen goes by the seed.
-constexpr char kCode[] = R"(import json, math, sys
+constexpr char kProposingCode[] = R"(import json, math, sys
 
 def at(p, on, test, kelvin, pull, seed):
     creep = p["creep.strength"] if "creep" in on else 0
@@ -74,8 +74,8 @@ seed: 3
 class ProgramNext : public CalibctlFixture {};
 
 TEST_F(ProgramNext, TheTestThatTellsEffectsApartIsProposedAndNamesOne) {
-  Write("code.py", kCode);
-  Write("code_as_module.py", kCode);
+  Write("code.py", kProposingCode);
+  Write("code_as_module.py", kProposingCode);
   Write("measure.py", kMeasure);
   ASSERT_EQ(std::system(("cd '" + work_.string() + "' && /usr/bin/python3 -B measure.py").c_str()),
             0);

@@ -57,14 +57,6 @@ testing::SmallCampaign PerExperiment(const std::string& method) {
   return small;
 }
 
-v1::Posterior LastPosterior(SimulatedService& service) {
-  v1::Posterior last;
-  for (const auto& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
-  }
-  return last;
-}
-
 // In order: modulus, angle, its spread, and the scores of the fitted and of the held-out test.
 void ExpectWithinBounds(double angle, double spread, double score) {
   EXPECT_GE(angle + spread * score, 10 * kRadian);

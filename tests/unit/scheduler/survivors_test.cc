@@ -16,7 +16,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr int kStarted = 8;
-constexpr int kLoadSteps = 6;
+constexpr int kSurvivorLoadSteps = 6;
 
 /// An iteration of which the first samples come to their ends and the others diverge.
 void RunIteration(SimulatedService& service, int survivors, const std::string& noise = "given",
@@ -24,7 +24,7 @@ void RunIteration(SimulatedService& service, int survivors, const std::string& n
   testing::SmallCampaign campaign =
       testing::MakeSmallCampaign({.samples = kStarted,
                                   .max_iterations = method == "sqmc" ? 1 : 2,
-                                  .load_steps = kLoadSteps,
+                                  .load_steps = kSurvivorLoadSteps,
                                   .method = method,
                                   .inference = "  replicates: 0\n"});
   const auto set = [&campaign](const std::string& from, const std::string& to) {
@@ -36,7 +36,7 @@ void RunIteration(SimulatedService& service, int survivors, const std::string& n
   const std::int64_t worker = service.Connect("w", 1);
   for (int k = 0; k < kStarted; ++k) {
     const v1::Lease lease = service.Next(worker, v1::ServerMessage::kLease).lease();
-    if (k < survivors) service.SendStates(worker, lease, 0, kLoadSteps);
+    if (k < survivors) service.SendStates(worker, lease, 0, kSurvivorLoadSteps);
     service.SendEnd(
         worker, lease.attempt(),
         k < survivors ? v1::Finished::OUTCOME_COMPLETED : v1::Finished::OUTCOME_DIVERGED,
