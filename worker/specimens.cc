@@ -17,8 +17,8 @@ namespace {
 std::string KeyOf(const v1::AttemptSpec& spec) {
   const dem::TestInfo* test = dem::FindTest(spec.test());
   const char* kind = test != nullptr && test->poured ? "sizes " : "recipe ";
-  std::string key = spec.has_recipe() ? absl::StrCat(kind, rpc::BytesOf(spec.recipe()))
-                                      : spec.packing_digest();
+  std::string key =
+      spec.has_recipe() ? absl::StrCat(kind, rpc::BytesOf(spec.recipe())) : spec.packing_digest();
   for (const v1::Mesh& mesh : spec.meshes()) {
     absl::StrAppend(&key, " mesh ", rpc::BytesOf(mesh));
   }

@@ -1,6 +1,6 @@
 #pragma once
-// SHA-256, the name under which contents (packings, data files, catalogues, scenarios) are known, and the bytes of a message
-// that may be named or compared so.
+// SHA-256, the name under which contents (packings, data files, catalogues, scenarios) are known,
+// and the bytes of a message that may be named or compared so.
 
 #include <google/protobuf/message_lite.h>
 
@@ -30,7 +30,8 @@ class Sha256 {
 /// Lower-case hexadecimal SHA-256 of content.
 std::string Sha256Hex(std::string_view content);
 
-/// The same bytes for equal messages, maps in the order of their keys; SerializeAsString() promises this to no one.
+/// The same bytes for equal messages, maps in the order of their keys; SerializeAsString() promises
+/// this to no one.
 std::string BytesOf(const google::protobuf::MessageLite& message);
 
 }  // namespace calib::rpc
