@@ -10,12 +10,12 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kDraws = 10'000;  // chosen: a probability is then known to 0.005
+constexpr int kProbabilityDraws = 10'000;  // chosen: a probability is then known to 0.005
 
 // Row i: the probabilities with the i-th draw of the errors, M columns.
 Eigen::MatrixXd DrawProbabilities(std::span<const EvidenceEstimate> evidence) {
-  Eigen::MatrixXd drawn(kDraws, static_cast<Eigen::Index>(evidence.size()));
-  for (Eigen::Index i = 0; i < kDraws; ++i) {
+  Eigen::MatrixXd drawn(kProbabilityDraws, static_cast<Eigen::Index>(evidence.size()));
+  for (Eigen::Index i = 0; i < kProbabilityDraws; ++i) {
     PhiloxStream stream({.seed = 0,
                          .purpose = StreamPurpose::kEvidenceErrors,
                          .iteration = 0,
@@ -44,8 +44,8 @@ std::vector<ModelProbability> ModelProbabilities(std::span<const EvidenceEstimat
     ModelProbability& model = models.emplace_back();
     model.probability = column.mean();
     std::sort(column.begin(), column.end());
-    model.q05 = column[kDraws / 20];
-    model.q95 = column[kDraws - 1 - kDraws / 20];
+    model.q05 = column[kProbabilityDraws / 20];
+    model.q95 = column[kProbabilityDraws - 1 - kProbabilityDraws / 20];
     if (&evidence[k] == &*best) continue;
     model.log_bayes_factor = evidence[k].log_evidence - best->log_evidence;
     model.log_bayes_factor_se = std::hypot(evidence[k].standard_error, best->standard_error);

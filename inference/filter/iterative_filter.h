@@ -171,10 +171,9 @@ struct Posterior {
 /// iteration with log_proposal stands for itself.
 Eigen::VectorXd LogImportance(const JointPrior& priors, std::span<const Iteration> iterations);
 
-/// ln p(data | sample) of each row of predictions (N x T), N entries, with noise kGiven or
-/// kInferred; -infinity where a row is not finite. Errors: INVALID_ARGUMENT from ValidateData or
-/// for another width; FAILED_PRECONDITION with kEssTarget, whose sigma exists only once the
-/// iteration is complete.
+/// ln p(data | sample) of each row of predictions (N x T), N entries; -infinity where a row is not
+/// finite. Errors: INVALID_ARGUMENT from ValidateData or for another width; FAILED_PRECONDITION
+/// with kEssTarget, whose sigma exists only once the iteration is complete.
 absl::StatusOr<Eigen::VectorXd> LogLikelihood(const DataSet& data, const FilterOptions& options,
                                               const Eigen::MatrixXd& predictions);
 

@@ -206,20 +206,21 @@ Eigen::VectorXd StatedError(const campaign::MeasuredObservable& observable,
 }
 
 // Standard deviation of the model error that the calibration inferred for this observable, the
-// relative part of what the runs predict on average.
+// relative part of what the runs predict on average; the mean variance where tests have their own.
 Eigen::VectorXd InferredModelError(const report::CampaignView& parent,
                                    const std::string& observable, const Eigen::VectorXd& mean) {
-  Eigen::VectorXd square = Eigen::VectorXd::Zero(mean.size());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(mean.size());
+  int found = 0;
   for (const v1::Posterior::ModelError& error : parent.posterior.model_error()) {
     const bool own = std::any_of(
         error.observables().begin(), error.observables().end(),
         [&observable](const std::string& name) { return absl::EndsWith(name, "." + observable); });
     if (!own) continue;
-    square = error.relative().mean_square() * mean.cwiseAbs2() +
-             Eigen::VectorXd::Constant(mean.size(), error.absolute().mean_square());
-    break;
+    sum.array() +=
+        error.relative().mean_square() * mean.array().square() + error.absolute().mean_square();
+    ++found;
   }
-  return square.cwiseSqrt();
+  return found == 0 ? sum : Eigen::VectorXd((sum / found).cwiseSqrt());
 }
 
 // What the model is known to miss where it was calibrated.

@@ -17,6 +17,7 @@ namespace calib::diagnosis {
 namespace {
 
 constexpr const char* kNotCalculated = "the runs were made elsewhere, none can be made with it";
+constexpr const char* kNotDeclared = "model.effects of the program has no such effect";
 
 bool IsAmong(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -137,7 +138,8 @@ bool IsHeld(const campaign::Campaign& campaign, const std::string& effect) {
 }
 
 // Why an effect cannot be calculated on curves, in a clause; empty: it can.
-std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& effect) {
+std::string WhyNotCalculated(const campaign::Campaign& campaign, const EffectsOnCurves& curves,
+                             const std::string& effect) {
   for (const auto& [name, why] : curves.impossible) {
     if (name == effect) return why;
   }
@@ -145,7 +147,8 @@ std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& e
   const auto first = curves.by_strength.lower_bound(prefix);
   const bool can =
       first != curves.by_strength.end() && first->first.compare(0, prefix.size(), prefix) == 0;
-  return can ? "" : kNotCalculated;
+  if (can) return "";
+  return campaign.program ? kNotDeclared : kNotCalculated;
 }
 
 // Nobody takes part in a race.
@@ -270,7 +273,7 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
   for (const dem::EffectInfo* effect : dem::AllEffects(campaign.model.user_effects)) {
     if (IsAmong(campaign.model.effects, effect->name)) continue;
     const bool held = elsewhere && IsHeld(campaign, effect->name);
-    std::string why = elsewhere && !held ? WhyNotCalculated(curves, effect->name)
+    std::string why = elsewhere && !held ? WhyNotCalculated(campaign, curves, effect->name)
                                          : WhyNotJoin(campaign, effect->name);
     if (why.empty() && IsAmong(without, effect->name)) why = "left out as asked for";
     if (why.empty() && !elsewhere) why = WhyNotShown(campaign, *effect);

@@ -100,6 +100,16 @@ void AddPath(const Definition& definition, const inference::PosteriorPath& path,
   }
 }
 
+// EXPERIMENT.OBSERVABLE of each member, appended.
+void AddNames(const Definition& definition, const std::vector<std::pair<int, int>>& members,
+              google::protobuf::RepeatedPtrField<std::string>& names) {
+  for (const auto& [e, j] : members) {
+    const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(e)];
+    *names.Add() = absl::StrCat(experiment.name, ".",
+                                experiment.observables[static_cast<std::size_t>(j)].name);
+  }
+}
+
 void AddNoiseScale(const Definition& definition, const Eigen::MatrixXd& scale,
                    v1::Posterior& message) {
   const auto groups = inference::NoiseGroupsOf(definition.data);
@@ -108,11 +118,7 @@ void AddNoiseScale(const Definition& definition, const Eigen::MatrixXd& scale,
   }
   for (std::size_t g = 0; g < groups.size(); ++g) {
     v1::Posterior::NoiseScale& out = *message.add_noise_scale();
-    for (const auto& [e, j] : groups[g].members) {
-      const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(e)];
-      out.add_observables(absl::StrCat(experiment.name, ".",
-                                       experiment.observables[static_cast<std::size_t>(j)].name));
-    }
+    AddNames(definition, groups[g].members, *out.mutable_observables());
     const auto row = static_cast<Eigen::Index>(g);
     out.set_q05(scale(row, 0));
     out.set_q50(scale(row, 1));
@@ -134,11 +140,7 @@ void AddModelErrors(const Definition& definition,
                     v1::Posterior& message) {
   for (const inference::ModelErrorSummary& error : errors) {
     v1::Posterior::ModelError& out = *message.add_model_error();
-    for (const auto& [e, j] : error.members) {
-      const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(e)];
-      out.add_observables(absl::StrCat(experiment.name, ".",
-                                       experiment.observables[static_cast<std::size_t>(j)].name));
-    }
+    AddNames(definition, error.members, *out.mutable_observables());
     if (error.relative) AddSize(*error.relative, *out.mutable_relative());
     if (error.absolute) AddSize(*error.absolute, *out.mutable_absolute());
   }

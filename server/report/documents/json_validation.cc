@@ -5,6 +5,7 @@
 
 #include "dem/registry/catalog.h"
 #include "server/report/documents/json_documents.h"
+#include "server/report/documents/json_text.h"
 #include "server/report/text/people_units.h"
 
 namespace calib::report {
@@ -83,7 +84,7 @@ std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
   const Json answer = {{"valid", problems.empty()}, {"problems", wrong},
                        {"warnings", odd},           {"notes", notes},
                        {"experiments", read},       {"calibratable", names}};
-  return answer.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(answer);
 }
 
 }  // namespace calib::report

@@ -7,6 +7,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/campaign/model/words.h"
+#include "server/report/documents/json_text.h"
 #include "server/report/text/people_units.h"
 
 namespace calib::report {
@@ -151,7 +152,7 @@ std::string RecordJson(const CampaignView& view) {
       {"iterations", Iterations(view)},
       {"methods", {{"sentences", methods.sentences}, {"references", methods.references}}},
       {"latex", LatexTable(view)}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(json);
 }
 
 }  // namespace calib::report

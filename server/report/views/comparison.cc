@@ -244,9 +244,9 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
     comparison.p_value = inference::UpperTail(fitted.chi2, degrees, fitted.known);
   } else if (!judged) {
     comparison.note =
-        "The size of the errors was not stated independently (noise is inferred or tempered to an "
-        "effective sample size), so "
-        "nothing is said about whether the model is adequate.";
+        "The size of the errors was not stated independently (noise is inferred, tempered to an "
+        "effective sample size, or beside a model error that explains every misfit), so nothing is "
+        "said about whether the model is adequate.";
   } else {
     comparison.note =
         "There are fewer readings than parameters: nothing is left to judge the fit by.";

@@ -1,5 +1,6 @@
 #include "server/campaign/file/derive.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/campaign/file/campaign_file.h"
@@ -8,6 +9,9 @@
 
 namespace calib::campaign {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(YamlText, ReadsBackToTheSameTree) {
   const std::string text =
@@ -102,6 +106,26 @@ TEST(Derive, AnExtensionOfOneIterationMayHaveMore) {
                        "max_iterations: 6}"),
             std::string::npos)
       << *text;
+}
+
+// Runs of a table infer nothing, and may be of tests that read other observables.
+TEST(Derive, ATableHasNoGroupsOfNoise) {
+  for (const auto& [noise, left] : std::vector<std::pair<std::string, std::string>>{
+           {"{inferred: [{observables: [y]}]}", "noise: inferred"},
+           {"{model_error: [{observables: [y], relative: {prior: uniform, min: 0, max: 1}}]}", ""},
+           {"{ess_target: 0.3}", "noise: {ess_target: 0.3}"}}) {
+    const std::string parent = "name: a\nnoise: " + noise + "\n";
+    const Derivation table{.name = "b",
+                           .lineage = {.parent = "c1", .purpose = "prediction"},
+                           .rows = {{.like = 0, .values = {{"k", 1}}}}};
+    const auto text = Derive(parent, table);
+    ASSERT_TRUE(text.ok()) << text.status();
+    EXPECT_THAT(*text, HasSubstr(left));
+    EXPECT_EQ(text->find("noise") == std::string::npos, left.empty()) << *text;
+    const auto extension = Derive(parent, {.name = "b", .lineage = table.lineage});
+    ASSERT_TRUE(extension.ok()) << extension.status();
+    EXPECT_THAT(*extension, HasSubstr("noise")) << "it infers, as its parent does";
+  }
 }
 
 TEST(Derive, ABudgetTakesThePlaceOfTheParents) {

@@ -188,6 +188,17 @@ TEST(RaceList, OfRunsThatWereMadeElsewhereHasWhatIsCalculatedOnCurves) {
   EXPECT_THAT(race.not_excitable, Contains(Pair("apparatus_compliance", "left out as asked for")));
 }
 
+TEST(RaceList, OfAProgramSaysThatItDoesNotDeclareWhatIsNotCalculated) {
+  report::CampaignView view = RunsOfAnotherCode();
+  view.campaign.precomputed.reset();
+  view.campaign.program.emplace();
+  const Race race = RaceFor(view, {});
+  EXPECT_THAT(race.Names(), Contains("strain_offset"));
+  EXPECT_THAT(
+      race.not_excitable,
+      Contains(Pair("rolling_resistance", "model.effects of the program has no such effect")));
+}
+
 TEST(RaceList, NobodyWhoCanBeCalculatedIsSaid) {
   report::CampaignView view = RunsOfAnotherCode();
   for (campaign::Experiment& e : view.campaign.experiments) e.test.clear();

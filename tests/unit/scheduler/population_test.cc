@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <string>
 
 #include "absl/strings/str_replace.h"
@@ -71,14 +70,9 @@ TEST(Populations, AreInferredByEveryMethodWithinTheirBounds) {
     service.RunToEnd(1, true);
     EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished)
         << service.Campaign().progress.reason;
-    std::set<int> run;
-    for (const auto& evaluation : Value(service.Read().Evaluations(1))) {
-      if (evaluation.status == store::EvaluationStatus::kFinished)
-        run.insert(evaluation.key.sample);
-    }
+    const std::vector<store::SampleRecord> run = SamplesRun(service);
     EXPECT_GE(run.size(), 40U);
-    for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
-      if (run.count(sample.sample) == 0) continue;
+    for (const store::SampleRecord& sample : run) {
       ASSERT_EQ(sample.parameters.size(), 5U);
       for (const std::size_t score : {3U, 4U})
         ExpectWithinBounds(sample.parameters[1], sample.parameters[2], sample.parameters[score]);

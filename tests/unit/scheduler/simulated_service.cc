@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "dem/registry/catalog.h"
@@ -393,6 +394,16 @@ std::string SimulatedService::Runs(std::int64_t campaign) {
             Bytes(state.observables) + "\n";
   }
   return text;
+}
+
+std::vector<store::SampleRecord> SamplesRun(SimulatedService& service) {
+  std::set<int> run;
+  for (const store::EvaluationRecord& evaluation : Value(service.Read().Evaluations(1))) {
+    if (evaluation.status == store::EvaluationStatus::kFinished) run.insert(evaluation.key.sample);
+  }
+  std::vector<store::SampleRecord> samples = Value(service.Read().Samples(1));
+  std::erase_if(samples, [&run](const auto& sample) { return run.count(sample.sample) == 0; });
+  return samples;
 }
 
 v1::Posterior LastPosterior(SimulatedService& service) {

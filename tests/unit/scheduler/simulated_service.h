@@ -132,6 +132,9 @@ class SimulatedService {
   std::int64_t last_session_ = 0;
 };
 
+/// The samples of campaign 1 of which a run has come to its end.
+std::vector<store::SampleRecord> SamplesRun(SimulatedService& service);
+
 /// The posterior of the last iteration of campaign 1 that has one.
 v1::Posterior LastPosterior(SimulatedService& service);
 

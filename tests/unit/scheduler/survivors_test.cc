@@ -45,7 +45,9 @@ void RunIteration(SimulatedService& service, int survivors, const std::string& n
 }
 
 TEST(FewSurvivors, TheCampaignSaysHowManyAreLeftAndWhatWouldHelp) {
-  for (const char* noise : {"given", "inferred"}) {
+  for (const char* noise : {"given", "inferred",
+                            "{model_error: [{observables: [stress_ratio], relative: {prior: "
+                            "uniform, min: 0, max: 1}}]}"}) {
     for (const int survivors : {1, 2}) {
       SimulatedService service("survivors");
       RunIteration(service, survivors, noise);

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <set>
 #include <string>
 
 #include "server/scheduler/posterior_record.h"
@@ -41,14 +40,6 @@ testing::SmallCampaign Campaign(const std::string& method, const std::string& in
                                      .extra = extra});
 }
 
-v1::Posterior Last(SimulatedService& service) {
-  v1::Posterior last;
-  for (const auto& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
-  }
-  return last;
-}
-
 TEST(TiedPriors, NoRunOfAnyMethodViolatesAConstraint) {
   struct Case {
     const char* method;
@@ -63,17 +54,12 @@ TEST(TiedPriors, NoRunOfAnyMethodViolatesAConstraint) {
     service.RunToEnd(1, true);
     EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished)
         << service.Campaign().progress.reason;
-    std::set<int> run;
-    for (const auto& evaluation : Value(service.Read().Evaluations(1))) {
-      if (evaluation.status == store::EvaluationStatus::kFinished)
-        run.insert(evaluation.key.sample);
-    }
+    const std::vector<store::SampleRecord> run = SamplesRun(service);
     EXPECT_GE(run.size(), 20U);
-    for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
-      if (run.count(sample.sample) == 0) continue;
+    for (const store::SampleRecord& sample : run) {
       EXPECT_TRUE(Meets(sample.parameters[0], sample.parameters[1])) << c.method << c.inference;
     }
-    const v1::Posterior posterior = Last(service);
+    const v1::Posterior posterior = LastPosterior(service);
     for (int i = 0; i + 1 < posterior.draws_size(); i += 2) {
       EXPECT_TRUE(Meets(posterior.draws(i), posterior.draws(i + 1))) << c.method;
     }
@@ -86,7 +72,7 @@ TEST(HeldParameters, AreTheSameInEveryLaterSampleAndReportedAsGiven) {
                           "  freeze: {1: [young_modulus]}\n  tolerance: 1e-9\n  replicates: 0\n",
                           ""));
   service.RunToEnd(1, true);
-  const v1::Posterior posterior = Last(service);
+  const v1::Posterior posterior = LastPosterior(service);
   ASSERT_EQ(posterior.parameters_size(), 2);
   EXPECT_TRUE(posterior.parameters(0).conditioned_on());
   EXPECT_FALSE(posterior.parameters(1).conditioned_on());
@@ -111,7 +97,7 @@ TEST(HeldParameters, SameBitsWhateverGoesWrong) {
   SimulatedService calm("held_calm");
   calm.Submit(campaign);
   calm.RunToEnd(1, true);
-  const v1::Posterior posterior = Last(calm);
+  const v1::Posterior posterior = LastPosterior(calm);
   EXPECT_EQ(posterior.reversed_path_size(), posterior.path_size());
   EXPECT_GT(posterior.path_size(), 0);
   SimulatedService storm("held_storm");
@@ -140,7 +126,7 @@ TEST(NoiseGroups, TheirScaleIsReportedByName) {
   SimulatedService service("noise_groups");
   service.Submit(campaign);
   service.RunToEnd(1, true);
-  const v1::Posterior posterior = Last(service);
+  const v1::Posterior posterior = LastPosterior(service);
   ASSERT_EQ(posterior.noise_scale_size(), 1);
   EXPECT_THAT(posterior.noise_scale(0).observables(), ElementsAre("tx.stress_ratio"));
   EXPECT_LT(posterior.noise_scale(0).q05(), posterior.noise_scale(0).q95());
