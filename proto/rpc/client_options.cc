@@ -11,6 +11,7 @@
 #include <grpcpp/support/channel_arguments.h>
 #include <grpcpp/support/client_interceptor.h>
 #include <netdb.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -18,6 +19,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -35,6 +37,9 @@ namespace {
 /// Between looks at the files of a certificate [s].
 constexpr unsigned kFilesAgain = 1;
 constexpr std::chrono::milliseconds kHandshake{1500};
+/// For the first byte at a socket that is open. chosen: a server that shares its cores starts so
+/// late
+constexpr std::chrono::duration<int, std::milli> kFirstWord{10'000};
 
 /// Adds the token to every call that begins, while it is shown to whom it is meant for.
 class ShowToken final : public grpc::experimental::Interceptor {
@@ -88,21 +93,37 @@ absl::Status WhyNoSocket(const std::string& path) {
   address.sun_family = AF_UNIX;
   std::memcpy(address.sun_path, path.c_str(), std::min(path.size() + 1, sizeof(address.sun_path)));
   const int file = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool is_there =
-      connect(file, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
-  const int error = errno;
-  close(file);
-  if (is_there) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("unix:", path,
-                     " takes the connection and closes it: it is the socket of "
-                     "another account, or of no server of calib"));
+  const std::unique_ptr<const int, void (*)(const int*)> closed(&file,
+                                                                [](const int* f) { close(*f); });
+  if (connect(file, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+    if (errno == EACCES || errno == EPERM) {
+      return absl::PermissionDeniedError(
+          absl::StrCat("unix:", path, " is the socket of a server of another account"));
+    }
+    return absl::UnavailableError(absl::StrCat("no server answers at unix:", path));
   }
-  if (error == EACCES || error == EPERM) {
+  ucred listener{};
+  socklen_t length = sizeof(listener);
+  if (getsockopt(file, SOL_SOCKET, SO_PEERCRED, &listener, &length) == 0 &&
+      listener.uid != geteuid() && listener.uid != 0) {
     return absl::PermissionDeniedError(
         absl::StrCat("unix:", path, " is the socket of a server of another account"));
   }
-  return absl::UnavailableError(absl::StrCat("no server answers at unix:", path));
+  // A server speaks first (HTTP/2 settings); one that has no room or is not ours closes.
+  pollfd answer{.fd = file, .events = POLLIN, .revents = 0};
+  if (poll(&answer, 1, kFirstWord.count()) <= 0) {
+    return absl::DeadlineExceededError(absl::StrCat(
+        "unix:", path, " is open in process ", listener.pid, ", which does not answer within ",
+        kFirstWord.count() / 1000, " s: it is busy, or no server of calib"));
+  }
+  char first = 0;
+  if (recv(file, &first, 1, 0) <= 0) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("unix:", path,
+                     " takes the connection and closes it: it has no room for one more "
+                     "(calibd --max-connections), or is of another account or no server of calib"));
+  }
+  return absl::OkStatus();
 }
 
 /// Whether anything takes a TCP connection at the address.

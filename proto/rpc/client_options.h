@@ -32,10 +32,11 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address, const Acc
 /// A channel to a server of this very process, with a token that is shown with each call.
 std::shared_ptr<grpc::Channel> OpenChannelInside(grpc::Server& server, const std::string& token);
 
-/// Why a channel to the address does not connect, for people. UNAVAILABLE: nothing listens there.
-/// FAILED_PRECONDITION: something does, and speaks otherwise (plain text, TLS), shows a certificate
-/// of another authority or host or one that is revoked, or belongs to another account. Takes up to
-/// two seconds.
+/// Why a channel to the address does not connect, for people. OK: by now something answers there.
+/// UNAVAILABLE: nothing listens there. DEADLINE_EXCEEDED: what does says nothing. FAILED_PRECONDITION: something does, and
+/// closes the connection, speaks otherwise (plain text, TLS), shows a certificate of another
+/// authority or host or one that is revoked. PERMISSION_DENIED: the socket of another account.
+/// Takes up to two seconds, at a socket that is open and silent ten.
 absl::Status WhyNotConnected(const std::string& address, const Access& access);
 
 /// The call fails with DEADLINE_EXCEEDED this long from now.
