@@ -10,6 +10,7 @@
 #include <array>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <thread>
@@ -17,6 +18,7 @@
 #include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
+#include "worker/engine/engine_child.h"
 #include "worker/once.h"
 #include "worker/program/scratch.h"
 #include "worker/program_once.h"
@@ -138,11 +140,18 @@ int main(int argc, char** argv) {
   app.add_option("--checkpoint", once.checkpoint,
                  "file to go on from after an interruption, renewed after each load step of --once")
       ->needs(spec);
+  calib::worker::EngineChildOptions engine;
+  app.add_option("--engine", engine.shared, "")->group("");  // what a worker starts for its slots
+  app.add_option("--checkpoint-bytes", engine.most_checkpoint_bytes, "")->group("");
   server->excludes(spec)->excludes(run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (!engine.shared.empty()) {
+    engine.checkpoints = options.checkpoints;
+    return calib::worker::RunEngineChild(engine);
   }
   if (once.spec.empty() && program_once.run.empty() && options.server.empty()) {
     std::cerr << "either --server HOST:PORT, --once SPEC or --once-program RUN is needed\n";
@@ -173,6 +182,9 @@ int main(int argc, char** argv) {
   }
   if (options.checkpoints.empty()) {
     options.checkpoints = DefaultCheckpoints();
+  }
+  if (!options.checkpoints.empty()) {  // engines run elsewhere
+    options.checkpoints = std::filesystem::absolute(options.checkpoints);
   }
   options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * (1 << 30));
   options.cpu = CpuModel();

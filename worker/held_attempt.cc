@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "dem/model/state.h"
 #include "proto/rpc/fit_message.h"
-#include "worker/evaluate.h"
 
 namespace calib::worker {
 namespace {
@@ -14,37 +12,15 @@ constexpr std::int64_t kStatesPerBatch = 1000;
 
 }  // namespace
 
-HeldAttempt::HeldAttempt(v1::Lease lease) : lease_(std::move(lease)) {
-  if (!lease_.run().empty()) {
-    resting_ =
-        RestingRun{.run = lease_.run(),
-                   .rest_after = lease_.has_rest_after() ? std::optional<int>(lease_.rest_after())
-                                                         : std::nullopt};
-  }
-}
+HeldAttempt::HeldAttempt(v1::Lease lease) : lease_(std::move(lease)) {}
 
-v1::Finished HeldAttempt::RunDem(Specimens& specimens, const Checkpoints* checkpoints,
-                                 const std::function<void(v1::State)>& on_state,
-                                 std::stop_token stop) const {
-  const dem::StateSink sink = [&on_state](const dem::State& state) {
-    v1::State message;
-    message.set_load_step(state.load_step);
-    message.mutable_values()->Add(state.values.begin(), state.values.end());
-    on_state(std::move(message));
-  };
-  return resting_.has_value()
-             ? EvaluateToRung(lease_.spec(), *resting_, checkpoints, specimens, sink, stop)
-             : Evaluate(lease_.spec(), specimens, sink, stop);
-}
-
-void HeldAttempt::Run(Specimens& specimens, Programs& programs, const Checkpoints* checkpoints,
-                      std::function<void(v1::State)> on_state,
+void HeldAttempt::Run(Engines& engines, Programs& programs, std::function<void(v1::State)> on_state,
                       std::function<void(v1::Finished)> on_end) {
-  thread_ = std::jthread([this, &specimens, &programs, checkpoints, on_state = std::move(on_state),
+  thread_ = std::jthread([this, &engines, &programs, on_state = std::move(on_state),
                           on_end = std::move(on_end)](std::stop_token stop) {
     v1::Finished finished =
         lease_.has_program() ? programs.Evaluate(lease_.program(), lease_.attempt(), on_state, stop)
-                             : RunDem(specimens, checkpoints, on_state, stop);
+                             : engines.Evaluate(lease_, on_state, stop);
     finished.set_attempt(lease_.attempt());
     on_end(std::move(finished));
   });

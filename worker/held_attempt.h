@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "calib/v1/worker.pb.h"
+#include "worker/engine/engines.h"
 #include "worker/program/programs.h"
-#include "worker/resting_run.h"
-#include "worker/specimens.h"
 
 namespace calib::worker {
 
@@ -24,9 +23,9 @@ class HeldAttempt {
   explicit HeldAttempt(v1::Lease lease);
 
   /// Starts the run, of the DEM or of a program, as the lease has it. on_state and on_end are
-  /// called on its thread. Everything outlives it; checkpoints may be nullptr: none are kept.
-  void Run(Specimens& specimens, Programs& programs, const Checkpoints* checkpoints,
-           std::function<void(v1::State)> on_state, std::function<void(v1::Finished)> on_end);
+  /// called on its thread. Everything outlives it.
+  void Run(Engines& engines, Programs& programs, std::function<void(v1::State)> on_state,
+           std::function<void(v1::Finished)> on_end);
   bool started() const { return thread_.joinable(); }
   /// True from Run() until the end has been handed to AddEnd().
   bool running() const { return started() && !end_.has_value(); }
@@ -44,11 +43,7 @@ class HeldAttempt {
   void Acknowledge(std::int64_t up_to);
 
  private:
-  v1::Finished RunDem(Specimens& specimens, const Checkpoints* checkpoints,
-                      const std::function<void(v1::State)>& on_state, std::stop_token stop) const;
-
   v1::Lease lease_;
-  std::optional<RestingRun> resting_;
   std::deque<v1::State> kept_;  // not acknowledged; kept_[0] has position first_
   std::int64_t first_ = 0;
   std::int64_t next_ = 0;  // position of the first state not yet sent

@@ -17,9 +17,9 @@
 #include "dem/simulate/simulate.h"
 #include "dem/simulate/whole_file.h"
 #include "proto/rpc/digest.h"
-#include "worker/evaluate.h"
+#include "worker/engine/evaluate.h"
+#include "worker/engine/scenario_from_spec.h"
 #include "worker/message_file.h"
-#include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {

@@ -8,7 +8,6 @@
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
 #include <map>
-#include <optional>
 #include <thread>
 #include <utility>
 
@@ -19,11 +18,11 @@
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"
 #include "proto/rpc/text_kinds.h"
-#include "worker/checkpoints.h"
+#include "worker/engine/checkpoints.h"
+#include "worker/engine/engines.h"
 #include "worker/held_attempt.h"
 #include "worker/program/programs.h"
 #include "worker/server_link.h"
-#include "worker/specimens.h"
 
 namespace calib::worker {
 namespace {
@@ -58,9 +57,14 @@ class Worker::Impl {
                    [this](const absl::Status& status) {
                      asio::post(io_, [this, status] { Closed(status); });
                    }}),
-        specimens_([this](const std::string& digest, std::stop_token stop) {
-          return link_.GetBlob(digest, std::move(stop));
-        }),
+        engines_({.program = options_.engine,
+                  .fetch =
+                      [this](const std::string& digest, std::stop_token stop) {
+                        return link_.GetBlob(digest, std::move(stop));
+                      },
+                  .scratch = options_.scratch,
+                  .checkpoints = options_.checkpoints,
+                  .most_checkpoint_bytes = options_.most_checkpoint_bytes}),
         programs_({.fetch =
                        [this](const std::string& digest, std::stop_token stop) {
                          return link_.GetBlob(digest, std::move(stop));
@@ -83,9 +87,9 @@ class Worker::Impl {
       spdlog::warn("not_found allow_command={}: no campaign can run it here", name);
     }
     if (!options_.checkpoints.empty()) {
-      auto opened = Checkpoints::Open(options_.checkpoints, options_.most_checkpoint_bytes);
+      const auto opened = Checkpoints::Open(options_.checkpoints, options_.most_checkpoint_bytes);
       if (opened.ok()) {
-        checkpoints_ = *std::move(opened);
+        checkpoints_ = opened->identity();
       } else {
         spdlog::warn("no_checkpoints reason=\"{}\"", std::string(opened.status().message()));
       }
@@ -109,7 +113,7 @@ class Worker::Impl {
     hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
     hello.set_cpu(rpc::Fitted(v1::NAME, options_.cpu));
     for (const std::string& name : programs_.AllowedNames()) hello.add_programs(name);
-    hello.set_checkpoints(checkpoints_.has_value() ? checkpoints_->identity() : "");
+    hello.set_checkpoints(checkpoints_);
     for (auto& [id, attempt] : held_) {
       hello.add_attempts(id);
       attempt.StreamLost();
@@ -300,7 +304,7 @@ class Worker::Impl {
         ++running;
         spdlog::info("start attempt={}", id);
         attempt.Run(
-            specimens_, programs_, checkpoints_.has_value() ? &*checkpoints_ : nullptr,
+            engines_, programs_,
             [this, id = id](v1::State state) {
               asio::post(io_, [this, id, state = std::move(state)] { Reached(id, state); });
             },
@@ -443,9 +447,9 @@ class Worker::Impl {
   absl::Status result_;
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;
-  Specimens specimens_;
+  Engines engines_;
   Programs programs_;
-  std::optional<Checkpoints> checkpoints_;
+  std::string checkpoints_;                     // identity of their folder; empty: none are kept
   std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out
   std::map<std::int64_t, HeldAttempt> held_;
   std::jthread looking_why_;  // joined first

@@ -21,10 +21,11 @@ struct WorkerOptions {
   int threads_per_slot = 1;               ///< > 0
   double contact_updates_per_second = 0;  ///< speed of one thread, as measured
   std::string cpu{};                      ///< model name, recorded with every attempt
-  std::string checkpoints{};              ///< folder for runs that rest; empty: none are kept
+  std::string checkpoints{};  ///< absolute folder for runs that rest; empty: none are kept
   std::int64_t most_checkpoint_bytes = std::int64_t{4} << 30;
   std::vector<std::string> allowed_commands{};  ///< programs that may run as models; "*": any
-  std::string scratch{};                        ///< folder below which they run; empty: the usual
+  std::string scratch{};  ///< folder below which they run and engines share; empty: the usual
+  std::string engine = "/proc/self/exe";  ///< the program that answers to `--engine`
   std::chrono::milliseconds farewell{
       3000};  ///< longest wait for the last acknowledgement after a stop
 };

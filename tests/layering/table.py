@@ -8,7 +8,7 @@ dem        elementary < geometry < particles < model < contact < contact/laws < 
 inference  numerics < sampling < prior < data < mixture < scatter < evidence < filter < tmcmc < surrogate < emulator
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc
-worker     program < .
+worker     program < engine < .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
            < scheduler < { service report/documents } < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
 """
@@ -23,6 +23,7 @@ inference         |                                                             
 proto/calib/v1    |                                                                        |
 proto/rpc         | proto/calib                                                            | grpcpp chrono openssl
 worker            | dem proto                                                              | grpcpp spdlog chrono CLI nlohmann
+worker/engine     | dem proto worker/program                                                       | chrono spdlog
 worker/program    | proto                                                                  | chrono
 server/campaign   | {CAMPAIGN_OF_DEM} inference                                            | openssl
 server/access     |                                                                        | openssl spdlog

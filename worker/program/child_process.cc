@@ -10,8 +10,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstring>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "proto/rpc/text_kinds.h"
 
 namespace calib::worker {
@@ -51,6 +53,12 @@ class PipeSignalHeld {
 };
 
 }  // namespace
+
+std::string InWords(const ChildEnd& end) {
+  if (!end.signal.has_value()) return absl::StrCat("exit ", end.exit.value_or(0));
+  const char* const name = sigabbrev_np(*end.signal);
+  return name != nullptr ? absl::StrCat("SIG", name) : absl::StrCat("signal ", *end.signal);
+}
 
 void CloseFile(int& file) {
   if (file >= 0) close(file);

@@ -20,6 +20,9 @@ struct ChildEnd {
   std::optional<int> signal{};
 };
 
+/// SIGSEGV, or `exit 1`.
+std::string InWords(const ChildEnd& end);
+
 /// Reads and writes as far as it can without waiting for the other side. Group and descendants do
 /// not outlive it, nor does the child outlive the worker (PR_SET_PDEATHSIG). One thread at a time.
 class ChildProcess {

@@ -39,11 +39,6 @@ std::string LastLine(const std::string& words) {
   return newline == std::string::npos ? trimmed : trimmed.substr(newline + 1);
 }
 
-std::string SignalName(int number) {
-  const char* const name = sigabbrev_np(number);
-  return name != nullptr ? absl::StrCat("SIG", name) : absl::StrCat("signal ", number);
-}
-
 }  // namespace
 
 /// One run of a program.
@@ -266,7 +261,7 @@ class RunningProgram::Talk {
       set(v1::Finished::OUTCOME_DIVERGED, why.empty() ? absl::StrCat("exit 3 ", SoMany()) : why);
     } else if (end.signal.has_value()) {
       set(v1::Finished::OUTCOME_MODEL_FAILED,
-          absl::StrCat("ended by ", SignalName(*end.signal),
+          absl::StrCat("ended by ", InWords(end),
                        *end.signal == SIGKILL ? " (the machine may have had no memory left) " : " ",
                        SoMany()));
     } else {

@@ -1,4 +1,4 @@
-#include "worker/specimens.h"
+#include "worker/engine/specimens.h"
 
 #include <utility>
 #include <vector>
@@ -9,7 +9,7 @@
 #include "dem/registry/catalog.h"
 #include "dem/simulate/packing_generator.h"
 #include "proto/rpc/digest.h"
-#include "worker/scenario_from_spec.h"
+#include "worker/engine/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {
@@ -79,8 +79,15 @@ absl::StatusOr<dem::Packing> Specimens::Generate(const v1::AttemptSpec& spec,
     recipe.radii = std::move(like.radius);
   }
   const dem::TestInfo* test = dem::FindTest(spec.test());
-  return test != nullptr && test->poured ? dem::GenerateSizes(recipe)
-                                         : dem::GeneratePacking(recipe, 1, stop);
+  if (test != nullptr && test->poured) return dem::GenerateSizes(recipe);
+  if (shared_ == nullptr) return dem::GeneratePacking(recipe, 1, stop);
+  const std::string key = absl::StrCat("packing-", rpc::Sha256Hex(rpc::BytesOf(spec.recipe())));
+  ASSIGN_OR_RETURN(const std::string text,
+                   shared_->Get(key, stop, [&]() -> absl::StatusOr<std::string> {
+                     ASSIGN_OR_RETURN(const auto packing, dem::GeneratePacking(recipe, 1, stop));
+                     return dem::FormatPacking(packing);  // read back it has the same bits
+                   }));
+  return ReadPacking(text);
 }
 
 Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token stop) const {

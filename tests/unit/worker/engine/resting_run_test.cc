@@ -1,4 +1,4 @@
-#include "worker/resting_run.h"
+#include "worker/engine/resting_run.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
 #include "tests/support/small_campaign.h"
-#include "worker/evaluate.h"
+#include "worker/engine/evaluate.h"
 
 namespace calib::worker {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// The packings and meshes this process has fetched or generated, shared by its slots.
+// The packings and meshes this process has fetched or generated.
 
 #include <map>
 #include <memory>
@@ -13,6 +13,7 @@
 #include "calib/v1/worker.pb.h"
 #include "dem/geometry/triangle_mesh.h"
 #include "dem/particles/packing.h"
+#include "worker/engine/shared_content.h"
 #include "worker/program/fetch.h"
 
 namespace calib::worker {
@@ -23,11 +24,13 @@ struct Specimen {
   std::map<std::string, dem::TriangleMesh> meshes;  ///< by name of the piece they replace
 };
 
-/// Thread-safe. Slots that ask for the same specimen at the same time share one making of it; a
-/// slot that is stopped leaves without ending the making, which others may be waiting for.
+/// Thread-safe. Runs that ask for the same specimen at the same time share one making of it; a run
+/// that is stopped leaves without ending the making, which others may be waiting for.
 class Specimens {
  public:
-  explicit Specimens(Fetch fetch) : fetch_(std::move(fetch)) {}
+  /// shared: nullptr, or where packings that were generated are shared with other processes.
+  explicit Specimens(Fetch fetch, const SharedContent* shared = nullptr)
+      : fetch_(std::move(fetch)), shared_(shared) {}
   /// Stops what is being made.
   ~Specimens();
   Specimens(const Specimens&) = delete;
@@ -50,6 +53,7 @@ class Specimens {
   Result Make(const v1::AttemptSpec& spec, std::stop_token stop) const;
 
   const Fetch fetch_;
+  const SharedContent* const shared_;
   absl::Mutex mutex_;
   absl::CondVar changed_;
   std::map<std::string, std::shared_ptr<Entry>> entries_ ABSL_GUARDED_BY(mutex_);

@@ -1,11 +1,9 @@
-#include "worker/evaluate.h"
-
-#include <chrono>
+#include "worker/engine/evaluate.h"
 
 #include "absl/strings/str_cat.h"
 #include "dem/model/state.h"
 #include "dem/simulate/simulate.h"
-#include "worker/scenario_from_spec.h"
+#include "worker/engine/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {
@@ -53,17 +51,8 @@ v1::Finished Ended(const absl::Status& status) {
 
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
                       std::stop_token stop, const dem::Recording& recording) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto core_seconds = [start](int threads) {
-    return threads *
-           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  };
   const auto specimen = specimens.Get(spec, stop);
-  if (!specimen.ok()) {
-    v1::Finished finished = Ended(specimen.status());
-    finished.set_core_seconds(core_seconds(1));
-    return finished;
-  }
+  if (!specimen.ok()) return Ended(specimen.status());
   dem::Scenario scenario = ScenarioFromSpec(spec);
   scenario.packing = (*specimen)->packing;
   scenario.meshes = (*specimen)->meshes;
@@ -84,7 +73,6 @@ v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const d
     finished = Ended(summary.status());
   }
   finished.set_states(states);
-  finished.set_core_seconds(core_seconds(scenario.threads));
   return finished;
 }
 

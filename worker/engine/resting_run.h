@@ -8,8 +8,8 @@
 #include "calib/v1/worker.pb.h"
 #include "dem/model/scenario.h"
 #include "dem/model/state.h"
-#include "worker/checkpoints.h"
-#include "worker/specimens.h"
+#include "worker/engine/checkpoints.h"
+#include "worker/engine/specimens.h"
 
 namespace calib::worker {
 

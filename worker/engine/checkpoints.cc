@@ -1,4 +1,4 @@
-#include "worker/checkpoints.h"
+#include "worker/engine/checkpoints.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "worker/scenario_from_spec.h"
+#include "worker/engine/scenario_from_spec.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "worker/resting_run.h"
+#include "worker/engine/resting_run.h"
 
 #include <spdlog/spdlog.h>
 
@@ -6,8 +6,8 @@
 
 #include "dem/model/state.h"
 #include "dem/simulate/simulate.h"
-#include "worker/evaluate.h"
-#include "worker/scenario_from_spec.h"
+#include "worker/engine/evaluate.h"
+#include "worker/engine/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {

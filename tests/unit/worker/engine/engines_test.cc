@@ -1,0 +1,196 @@
+#include "worker/engine/engines.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/sha256.h"
+#include "server/messages/attempt_spec.h"
+#include "tests/support/small_campaign.h"
+#include "worker/engine/evaluate.h"
+
+namespace calib::worker {
+namespace {
+
+/// Children of this process.
+std::vector<pid_t> Children() {
+  std::vector<pid_t> children;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::ifstream file(thread.path() / "children");
+    for (pid_t child = 0; file >> child;) children.push_back(child);
+  }
+  return children;
+}
+
+class EnginesOfAWorker : public ::testing::Test {
+ protected:
+  explicit EnginesOfAWorker(int load_steps = 6)
+      : campaign_(calib::testing::MakeSmallCampaign({.load_steps = load_steps})),
+        scratch_(::testing::TempDir() + "engines" + std::to_string(getpid())) {
+    const auto outcome = campaign::ReadCampaign(
+        campaign_.yaml, "c.yaml", [this](const std::string& path) -> absl::StatusOr<std::string> {
+          return campaign_.files.at(path);
+        });
+    EXPECT_TRUE(outcome.problems.empty());
+    *lease_.mutable_spec() = messages::SpecOf(outcome.campaign, 0, {{2e8, 0.5}, 0});
+    lease_.set_attempt(1);
+  }
+  ~EnginesOfAWorker() override { std::filesystem::remove_all(scratch_); }
+
+  absl::StatusOr<std::string> ContentOf(const std::string& digest) const {
+    for (const auto& [path, content] : campaign_.files) {
+      if (campaign::Sha256Hex(content) == digest) return content;
+    }
+    return absl::NotFoundError("no such content");
+  }
+
+  EnginesOptions Options() const {
+    return {.program = CALIB_WORKER,
+            .fetch = [this](const std::string& digest,
+                            std::stop_token /*stop*/) { return ContentOf(digest); },
+            .scratch = scratch_,
+            .checkpoints = {},
+            .grace = std::chrono::milliseconds(300)};
+  }
+
+  const calib::testing::SmallCampaign campaign_;
+  const std::string scratch_;
+  v1::Lease lease_;
+};
+
+TEST_F(EnginesOfAWorker, GiveTheBitsThatTheMechanicsGiveHere) {
+  Specimens specimens(
+      [this](const std::string& digest, std::stop_token /*stop*/) { return ContentOf(digest); });
+  std::vector<std::vector<double>> here;
+  const auto expected = Evaluate(
+      lease_.spec(), specimens, [&](const dem::State& state) { here.push_back(state.values); }, {});
+  Engines engines(Options());
+  for (int run = 0; run < 2; ++run) {
+    std::vector<std::vector<double>> there;
+    const auto finished =
+        engines.Evaluate(lease_,
+                         [&](const v1::State& state) {
+                           there.emplace_back(state.values().begin(), state.values().end());
+                         },
+                         {});
+    EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_COMPLETED) << finished.reason();
+    EXPECT_EQ(there, here);
+    EXPECT_EQ(finished.steps(), expected.steps());
+    EXPECT_EQ(finished.states(), 6);
+    EXPECT_GT(finished.core_seconds(), 0);
+    EXPECT_EQ(Children().size(), 1U) << "the engine is kept for the next run";
+  }
+}
+
+TEST_F(EnginesOfAWorker, MakeTheSamePackingOfARecipe) {
+  v1::PackingRecipe& recipe = *lease_.mutable_spec()->mutable_recipe();
+  recipe.set_particles(60);
+  recipe.set_porosity(0.42);
+  recipe.set_mean_radius(1e-3);
+  recipe.set_radius_spread(0.2);
+  recipe.set_aspect(1);
+  recipe.set_pressure(1e4);
+  recipe.set_seed(3);
+  Specimens specimens([](const std::string& digest, std::stop_token /*stop*/) {
+    return absl::StatusOr<std::string>(absl::NotFoundError(digest));
+  });
+  std::vector<std::vector<double>> here;
+  const auto expected = Evaluate(
+      lease_.spec(), specimens, [&](const dem::State& state) { here.push_back(state.values); }, {});
+  ASSERT_EQ(expected.outcome(), v1::Finished::OUTCOME_COMPLETED) << expected.reason();
+  Engines engines(Options());
+  std::vector<std::jthread> slots;
+  for (int slot = 0; slot < 2; ++slot) {
+    slots.emplace_back([&] {
+      std::vector<std::vector<double>> there;
+      const auto finished =
+          engines.Evaluate(lease_,
+                           [&](const v1::State& state) {
+                             there.emplace_back(state.values().begin(), state.values().end());
+                           },
+                           {});
+      EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_COMPLETED) << finished.reason();
+      EXPECT_EQ(there, here);
+    });
+  }
+}
+
+TEST_F(EnginesOfAWorker, ThatDiesEndsItsOwnRunAlone) {
+  Engines engines(Options());
+  const auto died = engines.Evaluate(
+      lease_, [](const v1::State& /*state*/) { kill(Children().front(), SIGSEGV); }, {});
+  EXPECT_EQ(died.outcome(), v1::Finished::OUTCOME_MODEL_FAILED);
+  EXPECT_NE(died.reason().find("the engine ended by SIGSEGV after "), std::string::npos)
+      << died.reason();
+  const auto next = engines.Evaluate(lease_, [](const v1::State& /*state*/) {}, {});
+  EXPECT_EQ(next.outcome(), v1::Finished::OUTCOME_COMPLETED) << next.reason();
+}
+
+TEST_F(EnginesOfAWorker, ThatDiedWhileItWaitedIsReplaced) {
+  Engines engines(Options());
+  const auto ignore = [](const v1::State& /*state*/) {};
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  kill(Children().front(), SIGKILL);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+}
+
+class EnginesOfALongRun : public EnginesOfAWorker {
+ protected:
+  EnginesOfALongRun() : EnginesOfAWorker(100) {}
+};
+
+TEST_F(EnginesOfALongRun, StopWhenTheyAreTold) {
+  Engines engines(Options());
+  std::stop_source stop;
+  const auto finished = engines.Evaluate(
+      lease_, [&](const v1::State& /*state*/) { stop.request_stop(); }, stop.get_token());
+  EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_STOPPED) << finished.reason();
+  EXPECT_LT(finished.states(), 100);
+  EXPECT_EQ(Children().size(), 1U) << "it is there for the next run";
+}
+
+TEST_F(EnginesOfALongRun, ThatDoNotHearAStopAreKilled) {
+  Engines engines(Options());
+  std::stop_source stop;
+  const auto finished = engines.Evaluate(
+      lease_,
+      [&](const v1::State& /*state*/) {
+        kill(Children().front(), SIGSTOP);
+        stop.request_stop();
+      },
+      stop.get_token());
+  EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_STOPPED) << finished.reason();
+  EXPECT_TRUE(Children().empty());
+}
+
+TEST_F(EnginesOfAWorker, SayWhyThereIsNoSpecimen) {
+  EnginesOptions options = Options();
+  options.fetch = [](const std::string& /*digest*/, std::stop_token /*stop*/) {
+    return absl::StatusOr<std::string>(absl::NotFoundError("no such content"));
+  };
+  Engines engines(options);
+  const auto finished = engines.Evaluate(lease_, [](const v1::State& /*state*/) {}, {});
+  EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_FAILED);
+  EXPECT_EQ(finished.reason(), "no such content");
+}
+
+TEST_F(EnginesOfAWorker, SayThatTheyCannotBeStarted) {
+  EnginesOptions options = Options();
+  options.program = "/nowhere/calib-worker";
+  Engines engines(options);
+  const auto finished = engines.Evaluate(lease_, [](const v1::State& /*state*/) {}, {});
+  EXPECT_EQ(finished.outcome(), v1::Finished::OUTCOME_FAILED);
+  EXPECT_NE(finished.reason().find("no engine could be started"), std::string::npos)
+      << finished.reason();
+}
+
+}  // namespace
+}  // namespace calib::worker

@@ -1,0 +1,202 @@
+#include "worker/engine/engines.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "calib/v1/engine.pb.h"
+#include "worker/engine/frames.h"
+
+namespace calib::worker {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How long a stop may wait to be heard. chosen: little beside a load step, and 50 looks a second
+constexpr std::chrono::milliseconds kBetweenLooks{20};
+/// For an engine whose input has ended, which has nothing to do.
+constexpr std::chrono::milliseconds kToLeave{1000};
+
+v1::Finished Ended(v1::Finished::Outcome outcome, std::string reason) {
+  v1::Finished finished;
+  finished.set_outcome(outcome);
+  finished.set_reason(std::move(reason));
+  return finished;
+}
+
+}  // namespace
+
+/// One run in one process.
+class Engines::Talk {
+ public:
+  Talk(ChildProcess& engine, const EnginesOptions& options,
+       const std::function<void(v1::State)>& on_state, const std::stop_token& stop)
+      : engine_(engine), options_(options), on_state_(on_state), stop_(stop) {}
+
+  v1::Finished Run(const v1::Lease& lease) {
+    v1::EngineOrder order;
+    order.mutable_run()->set_attempt(lease.attempt());
+    *order.mutable_run()->mutable_spec() = lease.spec();
+    order.mutable_run()->set_run(lease.run());
+    if (lease.has_rest_after()) order.mutable_run()->set_rest_after(lease.rest_after());
+    engine_.Look();
+    cpu_before_ = engine_.cpu_seconds();
+    engine_.Send(Framed(order));
+    while (!finished_.has_value() && !engine_.end().has_value() && !reader_.broken()) {
+      if (stop_.stop_requested() && Stop()) break;
+      engine_.Turn(kBetweenLooks, [this](std::string_view bytes) { reader_.Add(bytes); });
+      for (v1::EngineWord word; !finished_.has_value() && reader_.Next(word); word.Clear()) {
+        Hear(word);
+      }
+    }
+    return finished_.has_value() ? *std::move(finished_) : WithoutItsEnd();
+  }
+
+ private:
+  /// Whether it has to be killed by now.
+  bool Stop() {
+    if (!told_.has_value()) {
+      v1::EngineOrder order;
+      order.mutable_stop();
+      engine_.Send(Framed(order));
+      told_ = Clock::now();
+    }
+    return Clock::now() - *told_ >= options_.grace;
+  }
+
+  void Hear(v1::EngineWord& word) {
+    switch (word.word_case()) {
+      case v1::EngineWord::kState:
+        ++states_;
+        on_state_(std::move(*word.mutable_state()));
+        break;
+      case v1::EngineWord::kWants: {
+        v1::EngineOrder order;
+        if (auto content = options_.fetch(word.wants(), stop_); content.ok()) {
+          order.mutable_content()->set_content(*std::move(content));
+        } else {
+          order.mutable_content()->set_error(content.status().raw_code());
+          order.mutable_content()->set_message(std::string(content.status().message()));
+        }
+        engine_.Send(Framed(order));
+        break;
+      }
+      case v1::EngineWord::kFinished:
+        finished_ = std::move(*word.mutable_finished());
+        break;
+      case v1::EngineWord::WORD_NOT_SET:
+        break;
+    }
+  }
+
+  /// It has died, or is killed here.
+  v1::Finished WithoutItsEnd() {
+    const bool died = engine_.end().has_value();
+    engine_.End(std::chrono::milliseconds(0), [](std::string_view) {});
+    v1::Finished finished =
+        stop_.stop_requested() ? Ended(v1::Finished::OUTCOME_STOPPED, "stopped")
+        : died                 ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                                       absl::StrCat("the engine ended by ", InWords(*engine_.end()), " after ",
+                                                    states_, states_ == 1 ? " state" : " states"))
+                               : Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                                       "what the engine said is no message of ours");
+    finished.set_words(engine_.words());
+    finished.set_states(states_);
+    finished.set_core_seconds(std::max(0.0, engine_.cpu_seconds() - cpu_before_));
+    return finished;
+  }
+
+  ChildProcess& engine_;
+  const EnginesOptions& options_;
+  const std::function<void(v1::State)>& on_state_;
+  const std::stop_token& stop_;
+  FrameReader reader_;
+  std::int64_t states_ = 0;
+  double cpu_before_ = 0;  // s
+  std::optional<v1::Finished> finished_;
+  std::optional<Clock::time_point> told_;
+};
+
+Engines::Engines(EnginesOptions options) : options_(std::move(options)) {}
+
+Engines::~Engines() {
+  const absl::MutexLock lock(&mutex_);
+  for (const auto& engine : idle_) engine->CloseInput();
+  for (const auto& engine : idle_) {
+    for (const auto until = Clock::now() + kToLeave;
+         !engine->end().has_value() && Clock::now() < until;) {
+      engine->Turn(kBetweenLooks, [](std::string_view) {});
+    }
+  }
+  idle_.clear();
+}
+
+v1::Finished Engines::Evaluate(const v1::Lease& lease,
+                               const std::function<void(v1::State)>& on_state,
+                               const std::stop_token& stop) {
+  auto engine = Take();
+  if (!engine.ok()) {
+    return Ended(v1::Finished::OUTCOME_FAILED,
+                 absl::StrCat("no engine could be started: ", engine.status().message()));
+  }
+  v1::Finished finished = Talk(**engine, options_, on_state, stop).Run(lease);
+  if (const std::string words = (*engine)->words(); !words.empty()) {
+    spdlog::warn("engine attempt={} words=\"{}\"", lease.attempt(), words);
+  }
+  GiveBack(*std::move(engine));
+  return finished;
+}
+
+absl::StatusOr<std::unique_ptr<ChildProcess>> Engines::Take() {
+  while (true) {
+    std::unique_ptr<ChildProcess> engine;
+    {
+      const absl::MutexLock lock(&mutex_);
+      if (idle_.empty()) break;
+      engine = std::move(idle_.back());
+      idle_.pop_back();
+    }
+    engine->Turn(std::chrono::milliseconds(0), [](std::string_view) {});
+    if (!engine->end().has_value()) return engine;
+  }
+  return Start();
+}
+
+absl::StatusOr<std::unique_ptr<ChildProcess>> Engines::Start() {
+  std::string shared;
+  {
+    const absl::MutexLock lock(&mutex_);
+    if (scratch_ == nullptr) {
+      ASSIGN_OR_RETURN(scratch_, Scratch::Open(options_.scratch, options_.fetch));
+      ASSIGN_OR_RETURN(shared_, scratch_->MakeRunFolder());
+    }
+    shared = shared_.path();
+  }
+  // What lets this worker in at the server is not the engine's.
+  ChildOptions options{.program = options_.program,
+                       .arguments = {"calib-worker", "--engine", shared},
+                       .folder = shared,
+                       .environment = {"CALIB_TOKEN", "CALIB_TLS"},
+                       .most_file_bytes = {}};
+  if (!options_.checkpoints.empty()) {
+    for (const std::string& word :
+         {std::string("--checkpoints"), options_.checkpoints, std::string("--checkpoint-bytes"),
+          absl::StrCat(options_.most_checkpoint_bytes)}) {
+      options.arguments.push_back(word);
+    }
+  }
+  return launcher_.Start(options);
+}
+
+void Engines::GiveBack(std::unique_ptr<ChildProcess> engine) {
+  if (engine->end().has_value()) return;
+  engine->ForgetWords();
+  const absl::MutexLock lock(&mutex_);
+  idle_.push_back(std::move(engine));
+}
+
+}  // namespace calib::worker
