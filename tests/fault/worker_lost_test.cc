@@ -2,9 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <thread>
+#include <vector>
 
 #include "tests/fault/undisturbed.h"
 
@@ -102,6 +107,52 @@ TEST(WorkerLost, FrozenPastItsLeaseAndWoken) {
     lost += entry.what().find("nothing was heard") != std::string::npos ? 1 : 0;
   }
   EXPECT_GE(lost, 3U) << "the freezes must have been noticed";
+}
+
+/// Children of a process.
+std::vector<pid_t> ChildrenOf(pid_t parent) {
+  std::vector<pid_t> children;
+  std::error_code gone;
+  for (const auto& thread :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(parent) + "/task", gone)) {
+    std::ifstream file(thread.path() / "children");
+    for (pid_t child = 0; file >> child;) children.push_back(child);
+  }
+  return children;
+}
+
+// An engine that dies takes its own run along and nothing else: the worker stays connected, two
+// people's campaigns go on, to the bits of an undisturbed run.
+TEST(WorkerLost, ItsEnginesKilledBesideAnothersCampaign) {
+  Deployment deployment({.name = "killed-engine"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Submit(deployment);
+  Client client = deployment.client();
+  const SmallCampaign other = MakeSmallCampaign({.samples = 16, .load_steps = 6});
+  ASSERT_TRUE(client.SubmitCampaign(other.yaml, other.files, "other").ok());
+  deployment.StartWorker(2);
+  std::mt19937 random(20261130);
+  std::uniform_int_distribution<int> moment(0, 60);
+  constexpr std::array kSignals{SIGSEGV, SIGABRT, SIGKILL};
+  int killed = 0;
+  for (int i = 0; i < 200 && killed < 12; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(moment(random)));
+    const std::vector<pid_t> engines = ChildrenOf(deployment.workers().back().id());
+    if (engines.empty()) continue;
+    kill(engines[static_cast<std::size_t>(i) % engines.size()],
+         kSignals[static_cast<std::size_t>(i) % kSignals.size()]);
+    ++killed;
+  }
+  EXPECT_EQ(killed, 12);
+  ASSERT_TRUE(WaitFinished(deployment)) << deployment.Logs();
+  ExpectUndisturbed(deployment);
+  ASSERT_TRUE(client.Watch("c2", kLong).ok());
+  const auto status = client.Show("c2");
+  ASSERT_TRUE(status.ok()) << status.status();
+  EXPECT_EQ(status->state(), "finished") << status->reason();
+  const auto workers = client.Workers();
+  ASSERT_TRUE(workers.ok()) << workers.status();
+  EXPECT_TRUE(workers->workers_size() == 1 && workers->workers(0).connected());
 }
 
 /// So little may be lost that every sample goes on from its rungs: the result is that of runs which
