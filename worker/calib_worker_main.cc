@@ -23,6 +23,7 @@
 #include "worker/program/scratch.h"
 #include "worker/program_once.h"
 #include "worker/throughput.h"
+#include "worker/usable_cores.h"
 #include "worker/worker.h"
 
 namespace {
@@ -94,7 +95,7 @@ int main(int argc, char** argv) {
   app.add_option("--token", options.access.token,
                  "file with the token of a server without certificates [$CALIB_TOKEN, or where a "
                  "server of this account leaves it]");
-  app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
+  app.add_option("--slots", options.slots, "evaluations at a time [cores that it may use / threads per slot]")
       ->check(CLI::Range(1, 1024));
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
       ->check(CLI::Range(1, 1024))
@@ -174,8 +175,7 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_logger_mt("calib-worker"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
   if (options.slots == 0) {
-    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    options.slots = std::max(1, cores / options.threads_per_slot);
+    options.slots = std::max(1, calib::worker::UsableCores() / options.threads_per_slot);
   }
   if (options.name.empty()) {
     options.name = DefaultName();

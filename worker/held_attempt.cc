@@ -20,7 +20,7 @@ void HeldAttempt::Run(Engines& engines, Programs& programs, std::function<void(v
                           on_end = std::move(on_end)](std::stop_token stop) {
     v1::Finished finished =
         lease_.has_program() ? programs.Evaluate(lease_.program(), lease_.attempt(), on_state, stop)
-                             : engines.Evaluate(lease_, on_state, stop);
+                             : engines.Evaluate(lease_, on_state, stop, leave_.get_token());
     finished.set_attempt(lease_.attempt());
     on_end(std::move(finished));
   });

@@ -30,7 +30,10 @@ class HeldAttempt {
   /// True from Run() until the end has been handed to AddEnd().
   bool running() const { return started() && !end_.has_value(); }
   bool ended() const { return end_.has_value(); }
+  /// It is not wanted any more.
   void Stop() { thread_.request_stop(); }
+  /// It goes on elsewhere: from here, where its engine can.
+  void Leave() { lease_.has_program() ? Stop() : static_cast<void>(leave_.request_stop()); }
 
   void AddState(v1::State state);
   void AddEnd(v1::Finished finished);
@@ -49,6 +52,7 @@ class HeldAttempt {
   std::int64_t next_ = 0;  // position of the first state not yet sent
   std::optional<v1::Finished> end_;
   bool end_sent_ = false;
+  std::stop_source leave_;
   std::jthread thread_;  // last: joined before the rest goes
 };
 

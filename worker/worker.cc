@@ -382,7 +382,7 @@ class Worker::Impl {
     stopping_ = true;
     reconnect_.cancel();
     for (auto& [id, attempt] : held_) {
-      attempt.Stop();
+      attempt.Leave();
     }
     std::erase_if(held_, [](const auto& item) { return !item.second.started(); });
     farewell_.expires_after(options_.farewell);

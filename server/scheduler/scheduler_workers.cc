@@ -562,9 +562,7 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
     message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
   }
   const CampaignRun::Evaluation& evaluation = *run.Find(key);
-  if (evaluation.rest_after.has_value() || !evaluation.held_in.empty()) {
-    message.mutable_lease()->set_run(evaluation.digest);
-  }
+  if (message.lease().has_spec()) message.mutable_lease()->set_run(evaluation.digest);
   if (evaluation.rest_after.has_value()) {
     message.mutable_lease()->set_rest_after(*evaluation.rest_after);
   }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -18,7 +19,6 @@
 #include "calib/v1/engine.pb.h"
 #include "dem/model/state.h"
 #include "worker/engine/checkpoints.h"
-#include "worker/engine/evaluate.h"
 #include "worker/engine/frames.h"
 #include "worker/engine/resting_run.h"
 #include "worker/engine/shared_content.h"
@@ -83,11 +83,17 @@ class EngineChild {
   void Take(v1::EngineOrder& order) {
     switch (order.order_case()) {
       case v1::EngineOrder::kRun:
-        run_ = std::jthread(
-            [this, run = std::move(*order.mutable_run())](std::stop_token stop) { Do(run, stop); });
+        leave_ = {};
+        run_ =
+            std::jthread([this, run = std::move(*order.mutable_run()), leave = leave_.get_token()](
+                             std::stop_token stop) { Do(run, stop, leave); });
         break;
       case v1::EngineOrder::kStop:
-        run_.request_stop();
+        if (order.stop().keep()) {
+          leave_.request_stop();
+        } else {
+          run_.request_stop();
+        }
         break;
       case v1::EngineOrder::kContent: {
         const absl::MutexLock lock(&mutex_);
@@ -100,7 +106,7 @@ class EngineChild {
     }
   }
 
-  void Do(const v1::EngineRun& run, const std::stop_token& stop) {
+  void Do(const v1::EngineRun& run, const std::stop_token& stop, const std::stop_token& leave) {
     const double before = CpuSeconds();
     const dem::StateSink sink = [this](const dem::State& state) {
       v1::EngineWord word;
@@ -110,16 +116,13 @@ class EngineChild {
     };
     v1::EngineWord end;
     v1::Finished& finished = *end.mutable_finished();
-    if (run.run().empty()) {
-      finished = Evaluate(run.spec(), specimens_, sink, stop);
-    } else {
-      const RestingRun resting{
-          .run = run.run(),
-          .rest_after = run.has_rest_after() ? std::optional<int>(run.rest_after()) : std::nullopt};
-      finished =
-          EvaluateToRung(run.spec(), resting, checkpoints_.has_value() ? &*checkpoints_ : nullptr,
-                         specimens_, sink, stop);
-    }
+    const RestingRun resting{
+        .run = run.run(),
+        .rest_after = run.has_rest_after() ? std::optional<int>(run.rest_after()) : std::nullopt,
+        .leave = leave};
+    const bool may_be_kept = checkpoints_.has_value() && !run.run().empty();
+    finished = EvaluateToRung(run.spec(), resting, may_be_kept ? &*checkpoints_ : nullptr,
+                              specimens_, sink, stop);
     finished.set_core_seconds(CpuSeconds() - before);
     Say(end);
   }
@@ -168,12 +171,16 @@ class EngineChild {
   bool input_ended_ ABSL_GUARDED_BY(mutex_) = false;
   Specimens specimens_;
   std::optional<Checkpoints> checkpoints_;
-  std::jthread run_;  // last: joined first
+  std::stop_source leave_;  // of the run
+  std::jthread run_;        // last: joined first
 };
 
 }  // namespace
 
 int RunEngineChild(const EngineChildOptions& options) {
+  // A batch system signals every process of a job; the worker says what becomes of the run.
+  std::signal(SIGTERM, SIG_IGN);
+  std::signal(SIGINT, SIG_IGN);
   spdlog::set_default_logger(spdlog::stderr_logger_mt("engine"));
   spdlog::set_pattern("%l %v");
   EngineChild child(options);

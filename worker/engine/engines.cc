@@ -34,8 +34,9 @@ v1::Finished Ended(v1::Finished::Outcome outcome, std::string reason) {
 class Engines::Talk {
  public:
   Talk(ChildProcess& engine, const EnginesOptions& options,
-       const std::function<void(v1::State)>& on_state, const std::stop_token& stop)
-      : engine_(engine), options_(options), on_state_(on_state), stop_(stop) {}
+       const std::function<void(v1::State)>& on_state, const std::stop_token& stop,
+       const std::stop_token& leave)
+      : engine_(engine), options_(options), on_state_(on_state), stop_(stop), leave_(leave) {}
 
   v1::Finished Run(const v1::Lease& lease) {
     v1::EngineOrder order;
@@ -47,7 +48,7 @@ class Engines::Talk {
     cpu_before_ = engine_.cpu_seconds();
     engine_.Send(Framed(order));
     while (!finished_.has_value() && !engine_.end().has_value() && !reader_.broken()) {
-      if (stop_.stop_requested() && Stop()) break;
+      if (IsUnwanted() && Stop()) break;
       engine_.Turn(kBetweenLooks, [this](std::string_view bytes) { reader_.Add(bytes); });
       for (v1::EngineWord word; !finished_.has_value() && reader_.Next(word); word.Clear()) {
         Hear(word);
@@ -57,13 +58,17 @@ class Engines::Talk {
   }
 
  private:
+  bool IsUnwanted() const { return stop_.stop_requested() || leave_.stop_requested(); }
+
   /// Whether it has to be killed by now.
   bool Stop() {
-    if (!told_.has_value()) {
+    const bool keep = !stop_.stop_requested();
+    if (!told_.has_value() || (told_to_keep_ && !keep)) {
       v1::EngineOrder order;
-      order.mutable_stop();
+      order.mutable_stop()->set_keep(keep);
       engine_.Send(Framed(order));
-      told_ = Clock::now();
+      if (!told_.has_value()) told_ = Clock::now();
+      told_to_keep_ = keep;
     }
     return Clock::now() - *told_ >= options_.grace;
   }
@@ -98,12 +103,12 @@ class Engines::Talk {
     const bool died = engine_.end().has_value();
     engine_.End(std::chrono::milliseconds(0), [](std::string_view) {});
     v1::Finished finished =
-        stop_.stop_requested() ? Ended(v1::Finished::OUTCOME_STOPPED, "stopped")
-        : died                 ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
-                                       absl::StrCat("the engine ended by ", InWords(*engine_.end()), " after ",
-                                                    states_, states_ == 1 ? " state" : " states"))
-                               : Ended(v1::Finished::OUTCOME_MODEL_FAILED,
-                                       "what the engine said is no message of ours");
+        IsUnwanted() ? Ended(v1::Finished::OUTCOME_STOPPED, "stopped")
+        : died       ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                             absl::StrCat("the engine ended by ", InWords(*engine_.end()), " after ",
+                                          states_, states_ == 1 ? " state" : " states"))
+                     : Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                             "what the engine said is no message of ours");
     finished.set_words(engine_.words());
     finished.set_states(states_);
     finished.set_core_seconds(std::max(0.0, engine_.cpu_seconds() - cpu_before_));
@@ -114,11 +119,13 @@ class Engines::Talk {
   const EnginesOptions& options_;
   const std::function<void(v1::State)>& on_state_;
   const std::stop_token& stop_;
+  const std::stop_token& leave_;
   FrameReader reader_;
   std::int64_t states_ = 0;
   double cpu_before_ = 0;  // s
   std::optional<v1::Finished> finished_;
   std::optional<Clock::time_point> told_;
+  bool told_to_keep_ = false;
 };
 
 Engines::Engines(EnginesOptions options) : options_(std::move(options)) {}
@@ -137,13 +144,13 @@ Engines::~Engines() {
 
 v1::Finished Engines::Evaluate(const v1::Lease& lease,
                                const std::function<void(v1::State)>& on_state,
-                               const std::stop_token& stop) {
+                               const std::stop_token& stop, const std::stop_token& leave) {
   auto engine = Take();
   if (!engine.ok()) {
     return Ended(v1::Finished::OUTCOME_FAILED,
                  absl::StrCat("no engine could be started: ", engine.status().message()));
   }
-  v1::Finished finished = Talk(**engine, options_, on_state, stop).Run(lease);
+  v1::Finished finished = Talk(**engine, options_, on_state, stop, leave).Run(lease);
   if (const std::string words = (*engine)->words(); !words.empty()) {
     spdlog::warn("engine attempt={} words=\"{}\"", lease.attempt(), words);
   }

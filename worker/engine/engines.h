@@ -44,11 +44,12 @@ class Engines {
   /// reached. Never fails: what went wrong is the outcome, with its reason.
   ///   those of Evaluate() and EvaluateToRung(), and
   ///   MODEL_FAILED  the process ended, with its signal, and `words`: the last that it printed
-  ///   STOPPED       told to, even where it has to be killed for it
+  ///   STOPPED       told to by `stop` or `leave`, even where it has to be killed for it
   ///   FAILED        this machine starts no process
-  /// finished.attempt is left to the caller.
+  /// `leave`: a run that the lease gives a name to leaves a checkpoint, from which it goes on
+  /// elsewhere. finished.attempt is left to the caller.
   v1::Finished Evaluate(const v1::Lease& lease, const std::function<void(v1::State)>& on_state,
-                        const std::stop_token& stop);
+                        const std::stop_token& stop, const std::stop_token& leave = {});
 
  private:
   class Talk;

@@ -2,7 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
-#include <utility>
+#include <algorithm>
+#include <chrono>
 
 #include "dem/model/state.h"
 #include "dem/simulate/simulate.h"
@@ -37,11 +38,21 @@ v1::Finished EvaluateToRung(const v1::AttemptSpec& spec, const RestingRun& resti
                             const Checkpoints* checkpoints, Specimens& specimens,
                             const dem::StateSink& sink, std::stop_token stop) {
   const auto held = FindUsable(spec, resting.run, checkpoints, specimens, stop);
+  const auto keep = [&](const HeldRun& run) {
+    if (checkpoints == nullptr || run.checkpoint.empty()) return;
+    if (const absl::Status kept = checkpoints->Save(resting.run, run); !kept.ok()) {
+      spdlog::warn("checkpoint run={} not_kept=\"{}\"", resting.run, std::string(kept.message()));
+    }
+  };
   std::stop_source rest;
-  const std::stop_callback both(stop, [&rest] { rest.request_stop(); });
+  const std::stop_callback stopped(stop, [&rest] { rest.request_stop(); });
+  const std::stop_callback left(resting.leave, [&rest] { rest.request_stop(); });
   bool arrived = false;
   std::int64_t sent = 0;
-  std::string checkpoint;
+  HeldRun so_far{.steps = held.has_value() ? held->steps : 0,
+                 .contact_updates = held.has_value() ? held->contact_updates : 0,
+                 .checkpoint = {}};
+  auto kept_at = std::chrono::steady_clock::now();
   const dem::StateSink until_rung = [&](const dem::State& state) {
     if (arrived) return;  // of a checkpoint that lies behind the rung
     sink(state);
@@ -49,40 +60,40 @@ v1::Finished EvaluateToRung(const v1::AttemptSpec& spec, const RestingRun& resti
     arrived = state.load_step == resting.rest_after;
     if (arrived && held.has_value()) rest.request_stop();  // it may lie there: no other follows
   };
-  const dem::Recording recording{.vtk_directory = {},
-                                 .checkpoint =
-                                     [&](const std::string& bytes) {
-                                       if (arrived) {
-                                         checkpoint = bytes;
-                                         rest.request_stop();
-                                       }
-                                       return absl::OkStatus();
-                                     },
-                                 .resume_from = held.has_value() ? held->checkpoint : ""};
-  v1::Finished finished = Evaluate(spec, specimens, until_rung, rest.get_token(), recording);
+  const dem::CheckpointSink at_load_step = [&](const std::string& bytes) {
+    so_far.checkpoint = bytes;
+    if (arrived) rest.request_stop();
+    if (const auto now = std::chrono::steady_clock::now(); now - kept_at >= kBetweenCheckpoints) {
+      keep(so_far);
+      kept_at = now;
+    }
+    return absl::OkStatus();
+  };
+  v1::Finished finished =
+      Evaluate(spec, specimens, until_rung, rest.get_token(),
+               {.vtk_directory = {},
+                .checkpoint = checkpoints == nullptr && !resting.rest_after.has_value()
+                                  ? dem::CheckpointSink()
+                                  : at_load_step,
+                .resume_from = held.has_value() ? held->checkpoint : ""});
   finished.set_states(sent);
-  const HeldRun so_far{.steps = finished.steps(),
-                       .contact_updates = finished.contact_updates(),
-                       .checkpoint = std::move(checkpoint)};
-  if (held.has_value() && so_far.steps >= held->steps) {  // none when it could not be resumed
-    finished.set_steps(so_far.steps - held->steps);
-    finished.set_contact_updates(so_far.contact_updates - held->contact_updates);
-  }
+  // Both count from the beginning of the run.
+  const std::int64_t steps = std::max(finished.steps(), so_far.steps);
+  const std::int64_t updates = std::max(finished.contact_updates(), so_far.contact_updates);
+  finished.set_steps(steps - so_far.steps);
+  finished.set_contact_updates(updates - so_far.contact_updates);
+  so_far.steps = steps;
+  so_far.contact_updates = updates;
   // A test without checkpoints comes to its end.
   if (arrived && (finished.outcome() == v1::Finished::OUTCOME_STOPPED ||
                   finished.outcome() == v1::Finished::OUTCOME_COMPLETED)) {
     finished.set_outcome(v1::Finished::OUTCOME_RESTING);
     finished.clear_reason();
   }
-  if (checkpoints == nullptr) {
-    return finished;
-  }
-  if (finished.outcome() == v1::Finished::OUTCOME_RESTING && !so_far.checkpoint.empty()) {
-    if (const absl::Status kept = checkpoints->Save(resting.run, so_far); !kept.ok()) {
-      spdlog::warn("checkpoint run={} not_kept=\"{}\"", resting.run, std::string(kept.message()));
-    }
-  } else if (finished.outcome() != v1::Finished::OUTCOME_RESTING &&
-             finished.outcome() != v1::Finished::OUTCOME_STOPPED) {
+  if (finished.outcome() == v1::Finished::OUTCOME_RESTING ||
+      (finished.outcome() == v1::Finished::OUTCOME_STOPPED && resting.leave.stop_requested())) {
+    keep(so_far);
+  } else if (checkpoints != nullptr && finished.outcome() != v1::Finished::OUTCOME_STOPPED) {
     checkpoints->Remove(resting.run);
   }
   return finished;

@@ -20,7 +20,7 @@ namespace {
 
 /// Between looks whether another one is through. chosen: little beside the second that a specimen
 /// takes
-constexpr std::chrono::milliseconds kBetweenLooks{20};
+constexpr std::chrono::milliseconds kBetweenTries{20};
 
 std::optional<std::string> ContentAt(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -56,7 +56,7 @@ absl::StatusOr<std::string> SharedContent::Get(const std::string& key, const std
   if (!lock.can_lock()) return make();
   while (!lock.Try()) {
     if (stop.stop_requested()) return absl::CancelledError("stopped");
-    std::this_thread::sleep_for(kBetweenLooks);
+    std::this_thread::sleep_for(kBetweenTries);
   }
   if (auto there = ContentAt(path); there.has_value()) return *std::move(there);
   ASSIGN_OR_RETURN(std::string content, make());

@@ -157,6 +157,41 @@ TEST_F(EnginesOfALongRun, StopWhenTheyAreTold) {
   EXPECT_EQ(Children().size(), 1U) << "it is there for the next run";
 }
 
+TEST_F(EnginesOfALongRun, LeaveACheckpointWhereTheyHaveToGo) {
+  EnginesOptions options = Options();
+  options.checkpoints = scratch_ + "-checkpoints";
+  lease_.set_run("digest");
+  std::vector<std::string> whole;
+  std::vector<std::string> again;
+  const auto into = [](std::vector<std::string>& states) {
+    return [&states](const v1::State& state) { states.push_back(state.SerializeAsString()); };
+  };
+  {
+    Engines engines(Options());
+    ASSERT_EQ(engines.Evaluate(lease_, into(whole), {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  }
+  std::stop_source leave;
+  {
+    Engines engines(options);
+    const auto left = engines.Evaluate(
+        lease_,
+        [&](const v1::State& state) {
+          if (state.load_step() == 4) leave.request_stop();
+        },
+        {}, leave.get_token());
+    EXPECT_EQ(left.outcome(), v1::Finished::OUTCOME_STOPPED) << left.reason();
+  }
+  const std::filesystem::path kept = options.checkpoints + "/digest.checkpoint";
+  EXPECT_TRUE(std::filesystem::exists(kept));
+  {
+    Engines engines(options);
+    EXPECT_EQ(engines.Evaluate(lease_, into(again), {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  }
+  EXPECT_EQ(again, whole);
+  EXPECT_FALSE(std::filesystem::exists(kept));
+  std::filesystem::remove_all(options.checkpoints);
+}
+
 TEST_F(EnginesOfALongRun, ThatDoNotHearAStopAreKilled) {
   Engines engines(Options());
   std::stop_source stop;

@@ -51,7 +51,7 @@ class RestingRun : public ::testing::Test {
   Outcome RunTo(std::optional<int> rest_after, const Checkpoints* checkpoints) {
     Outcome outcome;
     outcome.finished = EvaluateToRung(
-        spec_, {.run = "digest", .rest_after = rest_after}, checkpoints, specimens_,
+        spec_, {.run = "digest", .rest_after = rest_after, .leave = {}}, checkpoints, specimens_,
         [&outcome](const dem::State& state) { outcome.states.push_back(state); }, {});
     return outcome;
   }
@@ -102,6 +102,44 @@ TEST_F(RestingRun, FromRungToRungToTheSameBitsInTheSameNumberOfSteps) {
   EXPECT_EQ(steps + rest.finished.steps(), whole.finished.steps());
   EXPECT_EQ(updates + rest.finished.contact_updates(), whole.finished.contact_updates());
   EXPECT_FALSE(checkpoints.Find("digest").has_value()) << "nobody goes on from there any more";
+}
+
+TEST_F(RestingRun, GoesOnElsewhereFromWhereItHadToLeave) {
+  const Outcome whole = RunTo(std::nullopt, nullptr);
+  ASSERT_EQ(whole.finished.outcome(), v1::Finished::OUTCOME_COMPLETED) << whole.finished.reason();
+  const Checkpoints checkpoints = Open();
+  std::stop_source leave;
+  std::vector<dem::State> states;
+  const v1::Finished left =
+      EvaluateToRung(spec_, {.run = "digest", .rest_after = {}, .leave = leave.get_token()},
+                     &checkpoints, specimens_,
+                     [&](const dem::State& state) {
+                       states.push_back(state);
+                       if (state.load_step == 2) leave.request_stop();
+                     },
+                     {});
+  EXPECT_EQ(left.outcome(), v1::Finished::OUTCOME_STOPPED);
+  EXPECT_EQ(states.size(), 3U);
+  ASSERT_TRUE(checkpoints.Find("digest").has_value());
+  const Outcome rest = RunTo(std::nullopt, &checkpoints);
+  EXPECT_EQ(rest.finished.outcome(), v1::Finished::OUTCOME_COMPLETED);
+  ExpectFirst(rest.states, kLoadSteps, whole.states);
+  EXPECT_LT(rest.finished.steps(), whole.finished.steps());
+  EXPECT_EQ(left.steps() + rest.finished.steps(), whole.finished.steps());
+  EXPECT_FALSE(checkpoints.Find("digest").has_value());
+}
+
+TEST_F(RestingRun, ThatIsNotWantedLeavesNothing) {
+  const Checkpoints checkpoints = Open();
+  std::stop_source stop;
+  const v1::Finished stopped = EvaluateToRung(
+      spec_, {.run = "digest", .rest_after = {}, .leave = {}}, &checkpoints, specimens_,
+      [&](const dem::State& state) {
+        if (state.load_step == 2) stop.request_stop();
+      },
+      stop.get_token());
+  EXPECT_EQ(stopped.outcome(), v1::Finished::OUTCOME_STOPPED);
+  EXPECT_FALSE(checkpoints.Find("digest").has_value());
 }
 
 TEST_F(RestingRun, WithoutACheckpointItBeginsAnewToTheSameBits) {
