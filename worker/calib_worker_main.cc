@@ -17,6 +17,7 @@
 #include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
+#include "proto/rpc/service_manager.h"
 #include "worker/once.h"
 #include "worker/program/scratch.h"
 #include "worker/program_once.h"
@@ -180,7 +181,11 @@ int main(int argc, char** argv) {
   spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",
                options.name, options.slots, options.threads_per_slot,
                options.contact_updates_per_second);
-  const absl::Status status = calib::worker::Worker(options).Run();
+  calib::worker::Worker worker(options);
+  // Ready to be told to leave; a server that is not there yet is waited for.
+  calib::rpc::TellServiceManager(calib::rpc::kReady);
+  const absl::Status status = worker.Run();
+  calib::rpc::TellServiceManager(calib::rpc::kStopping);
   spdlog::info("exit ok={}", status.ok());
   return status.ok() ? 0 : 1;
 }
