@@ -76,6 +76,7 @@ int main(int argc, char** argv) {
   calib::worker::OnceOptions once;
   calib::worker::ProgramOnceOptions program_once;
   int parent = -1;
+  int drain_within_s = 0;
   double checkpoints_gib = 4;
   options.slots = 0;
   // Read by `calibctl doctor`, line by line.
@@ -112,6 +113,12 @@ int main(int argc, char** argv) {
       ->allow_extra_args();
   app.add_option("--scratch", options.scratch,
                  "folder below which such programs run, each in one of its own [$TMPDIR or /tmp]");
+  app.add_option(
+         "--drain-within", drain_within_s,
+         "seconds that runs have to end after SIGTERM or SIGINT, while nothing new is begun; "
+         "a second signal stops them")
+      ->check(CLI::Range(0, 86'400))
+      ->capture_default_str();
   app.add_option("--exit-with-parent", parent,
                  "end when the parent process, of this id (0: whichever), ends");
   auto* spec =
@@ -176,13 +183,14 @@ int main(int argc, char** argv) {
     options.checkpoints = DefaultCheckpoints();
   }
   options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * (1 << 30));
+  options.drain_within = std::chrono::seconds(drain_within_s);
   options.cpu = CpuModel();
   options.contact_updates_per_second = calib::worker::MeasureThroughput(kBenchmark);
   spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",
                options.name, options.slots, options.threads_per_slot,
                options.contact_updates_per_second);
   calib::worker::Worker worker(options);
-  // Ready to be told to leave; a server that is not there yet is waited for.
+  // It hears signals from here on; a server that is not there yet is waited for.
   calib::rpc::TellServiceManager(calib::rpc::kReady);
   const absl::Status status = worker.Run();
   calib::rpc::TellServiceManager(calib::rpc::kStopping);

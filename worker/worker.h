@@ -25,13 +25,14 @@ struct WorkerOptions {
   std::int64_t most_checkpoint_bytes = std::int64_t{4} << 30;
   std::vector<std::string> allowed_commands{};  ///< programs that may run as models; "*": any
   std::string scratch{};                        ///< folder below which they run; empty: the usual
+  std::chrono::seconds drain_within{0};         ///< after a first signal, for what runs to end
   std::chrono::milliseconds farewell{
       3000};  ///< longest wait for the last acknowledgement after a stop
 };
 
-/// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent), until
-/// the server has drained it, or until the server refuses it. A lost connection is opened again
-/// with growing, jittered waits.
+/// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent; with
+/// drain_within they may end first, unless a second signal comes), until the server has drained it,
+/// or until the server refuses it. A lost connection is opened again with growing, jittered waits.
 /// Run() is called once; nothing here is thread-safe.
 class Worker {
  public:
