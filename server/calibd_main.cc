@@ -11,6 +11,7 @@
 
 #include "proto/rpc/access.h"
 #include "proto/rpc/address.h"
+#include "proto/rpc/service_manager.h"
 #include "server/page/page.h"
 #include "server/service/server.h"
 
@@ -151,8 +152,10 @@ int main(int argc, char** argv) {
     return absl::IsInvalidArgument(server.status()) ? 2 : 1;
   }
   auto page = http.empty() ? nullptr : ServePage(http, options, **server);
+  calib::rpc::TellServiceManager(calib::rpc::kReady);
   int signal = 0;
   sigwait(&signals, &signal);
+  calib::rpc::TellServiceManager(calib::rpc::kStopping);
   page.reset();
   (*server)->Shutdown(kShutdown);
   return failed ? 1 : 0;

@@ -18,6 +18,7 @@
 #include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
+#include "proto/rpc/service_manager.h"
 #include "worker/engine/engine_child.h"
 #include "worker/once.h"
 #include "worker/program/scratch.h"
@@ -78,6 +79,7 @@ int main(int argc, char** argv) {
   calib::worker::OnceOptions once;
   calib::worker::ProgramOnceOptions program_once;
   int parent = -1;
+  int drain_within_s = 0;
   double checkpoints_gib = 4;
   options.slots = 0;
   // Read by `calibctl doctor`, line by line.
@@ -95,7 +97,8 @@ int main(int argc, char** argv) {
   app.add_option("--token", options.access.token,
                  "file with the token of a server without certificates [$CALIB_TOKEN, or where a "
                  "server of this account leaves it]");
-  app.add_option("--slots", options.slots, "evaluations at a time [cores that it may use / threads per slot]")
+  app.add_option("--slots", options.slots,
+                 "evaluations at a time [cores that it may use / threads per slot]")
       ->check(CLI::Range(1, 1024));
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
       ->check(CLI::Range(1, 1024))
@@ -114,6 +117,12 @@ int main(int argc, char** argv) {
       ->allow_extra_args();
   app.add_option("--scratch", options.scratch,
                  "folder below which such programs run, each in one of its own [$TMPDIR or /tmp]");
+  app.add_option(
+         "--drain-within", drain_within_s,
+         "seconds that runs have to end after SIGTERM or SIGINT, while nothing new is begun; "
+         "a second signal stops them")
+      ->check(CLI::Range(0, 86'400))
+      ->capture_default_str();
   app.add_option("--exit-with-parent", parent,
                  "end when the parent process, of this id (0: whichever), ends");
   auto* spec =
@@ -187,12 +196,17 @@ int main(int argc, char** argv) {
     options.checkpoints = std::filesystem::absolute(options.checkpoints);
   }
   options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * (1 << 30));
+  options.drain_within = std::chrono::seconds(drain_within_s);
   options.cpu = CpuModel();
   options.contact_updates_per_second = calib::worker::MeasureThroughput(kBenchmark);
   spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",
                options.name, options.slots, options.threads_per_slot,
                options.contact_updates_per_second);
-  const absl::Status status = calib::worker::Worker(options).Run();
+  calib::worker::Worker worker(options);
+  // It hears signals from here on; a server that is not there yet is waited for.
+  calib::rpc::TellServiceManager(calib::rpc::kReady);
+  const absl::Status status = worker.Run();
+  calib::rpc::TellServiceManager(calib::rpc::kStopping);
   spdlog::info("exit ok={}", status.ok());
   return status.ok() ? 0 : 1;
 }

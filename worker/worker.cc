@@ -29,6 +29,8 @@ namespace {
 
 namespace asio = boost::asio;
 
+constexpr char kLeaving[] = "the worker is leaving";
+
 /// After these the server would say the same again.
 bool IsFinal(const absl::Status& status) {
   return absl::IsPermissionDenied(status) ||
@@ -78,11 +80,7 @@ class Worker::Impl {
                    .slots = options_.slots}) {}
 
   absl::Status Run() {
-    signals_.async_wait([this](const boost::system::error_code& error, int /*signal*/) {
-      if (!error) {
-        Stop();
-      }
-    });
+    WaitForSignal();
     for (const std::string& name : programs_.NotFound()) {
       spdlog::warn("not_found allow_command={}: no campaign can run it here", name);
     }
@@ -283,7 +281,7 @@ class Worker::Impl {
       return;
     }
     if (stopping_ || draining_) {
-      EndWithout(it->second, id, v1::Finished::OUTCOME_STOPPED, "the worker is leaving");
+      EndWithout(it->second, id, v1::Finished::OUTCOME_STOPPED, kLeaving);
       return;
     }
     StartWaiting();
@@ -376,7 +374,44 @@ class Worker::Impl {
     }
   }
 
-  /// First signal: simulations stop, their last states and ends are sent.
+  void WaitForSignal() {
+    signals_.async_wait([this](const boost::system::error_code& error, int /*signal*/) {
+      if (error) {
+        return;
+      }
+      if (options_.drain_within.count() > 0 && !std::exchange(told_to_leave_, true)) {
+        DrainWithin();
+        WaitForSignal();
+      } else {
+        Stop();
+      }
+    });
+  }
+
+  /// First signal, where runs may end: nothing new is begun, what has not begun is given back (the
+  /// server then leases nothing more), what still runs at the end of the time is stopped.
+  void DrainWithin() {
+    spdlog::info("draining running={} within_s={}", held_.size(), options_.drain_within.count());
+    draining_ = true;
+    for (auto& [id, attempt] : held_) {
+      if (!attempt.started() && !attempt.ended()) {
+        EndWithout(attempt, id, v1::Finished::OUTCOME_STOPPED, kLeaving);
+      }
+    }
+    farewell_.expires_after(options_.drain_within);
+    farewell_.async_wait([this](const boost::system::error_code& error) {
+      if (!error && !stopping_) {
+        Stop();
+      }
+    });
+    if (open_) {
+      LeaveIfDrained();
+    } else if (held_.empty()) {
+      Quit();
+    }
+  }
+
+  /// Simulations stop, their last states and ends are sent.
   void Stop() {
     spdlog::info("stopping held={}", held_.size());
     stopping_ = true;
@@ -436,11 +471,12 @@ class Worker::Impl {
   asio::steady_timer farewell_;
   rpc::Backoff backoff_{{}};
   std::chrono::milliseconds heartbeat_every_{1000};
-  bool open_ = false;      // a stream exists
-  bool welcome_ = false;   // and the server has accepted it
-  bool draining_ = false;  // takes nothing new
-  bool leaving_ = false;   // everything is sent, the stream is being closed
-  bool stopping_ = false;  // a signal was caught
+  bool open_ = false;           // a stream exists
+  bool welcome_ = false;        // and the server has accepted it
+  bool draining_ = false;       // takes nothing new
+  bool leaving_ = false;        // everything is sent, the stream is being closed
+  bool told_to_leave_ = false;  // by a signal, which leaves time
+  bool stopping_ = false;       // a signal was caught, or that time is over
   bool said_refusal_ = false;
   bool looks_why_ = false;  // another thread does
   bool said_why_ = false;   // in this outage

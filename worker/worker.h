@@ -26,13 +26,14 @@ struct WorkerOptions {
   std::vector<std::string> allowed_commands{};  ///< programs that may run as models; "*": any
   std::string scratch{};  ///< folder below which they run and engines share; empty: the usual
   std::string engine = "/proc/self/exe";  ///< the program that answers to `--engine`
+  std::chrono::seconds drain_within{0};   ///< after a first signal, for what runs to end
   std::chrono::milliseconds farewell{
       3000};  ///< longest wait for the last acknowledgement after a stop
 };
 
-/// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent), until
-/// the server has drained it, or until the server refuses it. A lost connection is opened again
-/// with growing, jittered waits.
+/// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent; with
+/// drain_within they may end first, unless a second signal comes), until the server has drained it,
+/// or until the server refuses it. A lost connection is opened again with growing, jittered waits.
 /// Run() is called once; nothing here is thread-safe.
 class Worker {
  public:

@@ -35,6 +35,7 @@ namespace calib::ctl {
   VERB(Workers)           \
   VERB(Doctor)            \
   VERB(Drain)             \
+  VERB(Scale)             \
   VERB(Effects)           \
   VERB(Tests)             \
   VERB(Contacts)          \

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/fault/undisturbed.h"
+#include "tests/support/sixty_four_grains.h"
 
 namespace calib::testing {
 namespace {
@@ -76,6 +77,68 @@ TEST(WorkerLost, AllAtOnceWhileTheServerIsFrozen) {
         << "round " << round << "\n"
         << deployment.Logs();
   }
+}
+
+/// A line of the only worker's log holds this.
+bool HasLogged(const Deployment& deployment, const std::string& text) {
+  return deployment.Logs().find(text) != std::string::npos;
+}
+
+TEST(WorkerLost, ToldToLeaveItEndsWhatItRuns) {
+  Deployment deployment({.name = "told-to-leave"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Submit(deployment);
+  deployment.StartWorker(2, {"--drain-within", "100"});
+  ASSERT_TRUE(Eventually(kLong, [&] { return HasLogged(deployment, "start attempt="); }));
+  Process& worker = deployment.workers().back();
+  worker.Signal(SIGTERM);
+  EXPECT_EQ(worker.Wait(kLong), 0) << deployment.Logs();
+  EXPECT_TRUE(HasLogged(deployment, "draining running=")) << deployment.Logs();
+  EXPECT_TRUE(HasLogged(deployment, " drained")) << deployment.Logs();
+  EXPECT_FALSE(HasLogged(deployment, "outcome=OUTCOME_STOPPED")) << deployment.Logs();
+  const auto evaluations = deployment.client().Show("c1");
+  ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+  EXPECT_GE(evaluations->model_evaluations(), 1) << "what ran has counted";
+  deployment.StartWorker(2);
+  ASSERT_TRUE(WaitFinished(deployment)) << deployment.Logs();
+  ExpectUndisturbed(deployment);
+}
+
+TEST(WorkerLost, ToldToLeaveTwiceOrForTooLongItStopsWhatItRuns) {
+  for (const bool twice : {true, false}) {
+    Deployment deployment({.name = "told-to-leave-twice"});
+    ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+    Client client = deployment.client();
+    // Each run takes hours.
+    std::string yaml = SixtyFourGrains("{q_over_p: {noise: {absolute: 0.3}}}", 4, 1);
+    const std::string fast = "rate: 1 1/s";
+    ASSERT_NE(yaml.find(fast), std::string::npos) << yaml;
+    yaml.replace(yaml.find(fast), fast.size(), "rate: 0.0001 1/s");
+    const auto id = client.SubmitCampaign(
+        yaml, {{"data.csv", "axial_strain,q_over_p\n0.002,0.5\n0.005,0.8\n0.01,1.0\n"}}, "r");
+    ASSERT_TRUE(id.ok()) << id.status();
+    deployment.StartWorker(1, {"--drain-within", twice ? "1000" : "1"});
+    ASSERT_TRUE(Eventually(kLong, [&] { return HasLogged(deployment, "start attempt="); }));
+    Process& worker = deployment.workers().back();
+    worker.Signal(SIGTERM);
+    ASSERT_TRUE(Eventually(kLong, [&] { return HasLogged(deployment, "draining running="); }));
+    if (twice) worker.Signal(SIGTERM);
+    EXPECT_EQ(worker.Wait(kLong), 0) << deployment.Logs();
+    EXPECT_TRUE(HasLogged(deployment, "outcome=OUTCOME_STOPPED")) << deployment.Logs();
+  }
+}
+
+// Nobody hears it then; it leaves all the same.
+TEST(WorkerLost, ToldToLeaveWhileTheServerIsAway) {
+  Deployment deployment({.name = "told-alone"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  deployment.StartWorker(1, {"--drain-within", "1000"});
+  ASSERT_TRUE(Eventually(kLong, [&] { return HasLogged(deployment, "connected server="); }));
+  deployment.server().Kill();
+  ASSERT_TRUE(Eventually(kLong, [&] { return HasLogged(deployment, "disconnected server="); }));
+  Process& worker = deployment.workers().back();
+  worker.Signal(SIGTERM);
+  EXPECT_EQ(worker.Wait(kLong), 0) << deployment.Logs();
 }
 
 TEST(WorkerLost, FrozenPastItsLeaseAndWoken) {

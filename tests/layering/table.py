@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     program < engine < .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < scheduler < { service report/documents } < client < { page diagnosis inspection } < ctl/shell < ctl < ctl/verbs < .
+           < scheduler < { service report/documents } < client < { page diagnosis inspection } < { ctl/shell ctl/slurm } < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
