@@ -49,29 +49,33 @@ double Spread(const Eigen::VectorXd& values, double mean) {
   return sd > kRounding * (std::abs(mean) + std::numeric_limits<double>::min()) ? sd : 1;
 }
 
-std::vector<Eigen::VectorXd> FixedStarts(Index d) {
+std::vector<Eigen::VectorXd> FixedStarts(Index d, bool grouped) {
   std::vector<Eigen::VectorXd> starts;
   for (const Start& start : kStarts) {
     starts.emplace_back(d + 2) << Eigen::VectorXd::Constant(d, std::log(start.length)),
         std::log(start.signal), std::log(start.scatter);
+    if (!grouped) continue;
+    starts.back().conservativeResize(d + 3);
+    starts.back()[d + 2] = std::log(start.scatter);
   }
   return starts;
 }
 
 Minimum MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
-                     double max_scatter, const std::vector<Eigen::VectorXd>& starts) {
-  const Index d = inputs.cols();
-  const KernelObjective objective(inputs, outputs);
-  Eigen::VectorXd lower(d + 2);
-  Eigen::VectorXd upper(d + 2);
+                     const GaussianProcessOptions& options,
+                     const std::vector<Eigen::VectorXd>& starts) {
+  const Index d = inputs.cols(), variances = options.groups.empty() ? 1 : 2;
+  const KernelObjective objective(inputs, outputs, options.groups);
+  Eigen::VectorXd lower(d + 1 + variances);
+  Eigen::VectorXd upper(d + 1 + variances);
   lower << Eigen::VectorXd::Constant(d, std::log(kShortest)), std::log(kLeastSignal),
-      std::log(kLeastNoise);
+      Eigen::VectorXd::Constant(variances, std::log(kLeastNoise));
   upper << Eigen::VectorXd::Constant(d, std::log(kLongest)), std::log(kMostSignal),
-      std::log(max_scatter);
+      Eigen::VectorXd::Constant(variances, std::log(options.max_scatter));
   Minimum best{.x = {}, .value = std::numeric_limits<double>::infinity()};
   for (const Eigen::VectorXd& start : starts) {
     const Eigen::VectorXd x = start.cwiseMax(lower).cwiseMin(upper);
-    Eigen::VectorXd gradient(d + 2);
+    Eigen::VectorXd gradient(x.size());
     if (!std::isfinite(objective(x, gradient))) continue;
     const Minimum minimum = MinimizeInBox(objective, x, lower, upper, kSearch);
     if (minimum.value < best.value) best = minimum;
@@ -87,6 +91,8 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
   assert(options.max_scatter >= kLeastScatter && options.max_scatter <= kMostScatter);
   assert(options.like == nullptr || !options.like->constant());
+  assert(options.groups.empty() || (!options.may_be_constant && options.like == nullptr &&
+                                    static_cast<Index>(options.groups.size()) == inputs.rows()));
   const Index n = inputs.rows();
   const Index d = inputs.cols();
   GaussianProcess process;
@@ -101,12 +107,12 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   const Eigen::MatrixXd all = process.Scaled(inputs);
   const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
 
-  std::vector<Eigen::VectorXd> starts = FixedStarts(d);
+  std::vector<Eigen::VectorXd> starts = FixedStarts(d, !options.groups.empty());
   if (options.like != nullptr) {
     process.used_ = options.like->used_;
     starts = {options.like->HyperParameters()};
   }
-  Minimum hyper = MostProbable(all(Eigen::all, process.used_), scaled, options.max_scatter, starts);
+  Minimum hyper = MostProbable(all(Eigen::all, process.used_), scaled, options, starts);
   if (!std::isfinite(hyper.value)) {
     return absl::FailedPreconditionError(
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
@@ -127,8 +133,8 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
         if (std::find(kept.begin(), kept.end(), j) != kept.end()) continue;
         std::vector<Index> used = kept;
         used.push_back(j);
-        const Minimum tried = MostProbable(all(Eigen::all, used), scaled, options.max_scatter,
-                                           FixedStarts(static_cast<Index>(used.size())));
+        const Minimum tried = MostProbable(all(Eigen::all, used), scaled, options,
+                                           FixedStarts(static_cast<Index>(used.size()), false));
         if (!(tried.value < hyper.value)) continue;
         hyper = tried;
         process.used_ = std::move(used);
@@ -151,6 +157,17 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   Eigen::MatrixXd covariance = KernelMatrix(
       process.train_, process.train_, {.lengths = process.lengths_, .signal = process.signal_});
   covariance.diagonal().array() += scatter;
+  if (!options.groups.empty()) {
+    const double group = std::exp(hyper.x[of + 2]);
+    process.group_variance_ = group * output_variance;
+    for (Index j = 0; j < n; ++j) {
+      for (Index i = 0; i < n; ++i) {
+        if (options.groups[static_cast<std::size_t>(i)] ==
+            options.groups[static_cast<std::size_t>(j)])
+          covariance(i, j) += group;
+      }
+    }
+  }
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   process.cholesky_ = factor.matrixL();
   process.alpha_ = factor.solve(scaled);
@@ -209,6 +226,18 @@ Eigen::VectorXd GaussianProcess::PredictMean(const Eigen::MatrixXd& inputs) cons
     mean.segment(first, size) = MeanFrom(CrossCovariances(Used(inputs.middleRows(first, size))));
   }
   return mean;
+}
+
+Eigen::MatrixXd GaussianProcess::Covariance(const Eigen::MatrixXd& a,
+                                            const Eigen::MatrixXd& b) const {
+  if (constant_) return Eigen::MatrixXd::Constant(a.rows(), b.rows(), constant_variance_);
+  const Eigen::MatrixXd at_a = Used(a), at_b = Used(b);
+  Eigen::MatrixXd cross_a = CrossCovariances(at_a), cross_b = CrossCovariances(at_b);
+  cholesky_.triangularView<Eigen::Lower>().solveInPlace(cross_a);
+  cholesky_.triangularView<Eigen::Lower>().solveInPlace(cross_b);
+  return output_sd_ * output_sd_ *
+         (KernelMatrix(at_a, at_b, {.lengths = lengths_, .signal = signal_}) -
+          cross_a.transpose() * cross_b);
 }
 
 Eigen::MatrixXd GaussianProcess::Scaled(const Eigen::MatrixXd& inputs) const {

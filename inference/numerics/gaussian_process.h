@@ -32,9 +32,13 @@ struct GaussianProcessOptions {
   /// A process of nearly the same runs, not constant(): the search begins at its hyper-parameters
   /// alone. Null: it begins at two fixed starts.
   const GaussianProcess* like = nullptr;
+  /// n numbers, equal for runs that share a departure from the function, as those on one packing
+  /// do; none: no run shares any. Only where !may_be_constant.
+  std::vector<int> groups = {};
 };
 
-/// output = f(input) + scatter,  f ~ GP(0, k),  scatter ~ N(0, scatter variance) independent,
+/// output = f(input) + group + scatter,  f ~ GP(0, k),  scatter ~ N(0, scatter variance)
+/// independent, group ~ N(0, group variance) one for all runs of a group,
 ///   k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r),
 ///   r^2 = sum_j (x_j - x'_j)^2 / l_j^2,
 /// a vague linear trend plus a Matern 5/2 departure with one length per input. Matern rather than
@@ -62,12 +66,17 @@ class GaussianProcess {
   /// Mean of f at the rows of an m x d matrix, m entries, the bits of Predict().mean; O(m n d).
   Eigen::VectorXd PredictMean(const Eigen::MatrixXd& inputs) const;
 
+  /// Covariances of f at the rows of a (m x d) with f at those of b (m' x d), m x m'.
+  Eigen::MatrixXd Covariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) const;
+
   /// Leave-one-out predictions of the n training outputs in closed form:
   ///   error_i = alpha_i / (K^-1)_ii, variance_i = 1 / (K^-1)_ii, alpha = K^-1 outputs
   ///                                                    [Rasmussen & Williams 2006, Eqs. 5.10-5.12]
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
   /// Variance of the scatter of a single run, in the square of the output's unit.
   double scatter_variance() const { return scatter_variance_; }
+  /// Variance of what runs of a group share, likewise; 0 without groups.
+  double group_variance() const { return group_variance_; }
   /// True where the process is a constant: no function of the inputs explains the outputs better.
   bool constant() const { return constant_; }
   /// d correlation lengths in units of the inputs; infinite along inputs that the function is not
@@ -94,6 +103,7 @@ class GaussianProcess {
   double signal_ = 1;               // s, in units of the output's variance
   double constant_variance_ = 0;    // of the mean, where constant
   double scatter_variance_ = 0;     // in units of the output
+  double group_variance_ = 0;       // likewise
   Eigen::MatrixXd cholesky_;        // of K, lower
   Eigen::VectorXd alpha_;           // K^-1 outputs
   LeaveOneOut leave_one_out_;

@@ -14,8 +14,8 @@ struct LogPrior {
   double mean, sd;
 };
 
-// Prior of the logarithm of hyper-parameter j among d lengths, signal and scatter: as the header
-// states it.
+// Prior of the logarithm of hyper-parameter j among d lengths, signal, scatter, group: as the
+// header states it.
 LogPrior HyperPrior(Index j, Index d) {
   if (j < d) return {std::log(3.0), 1};
   if (j == d) return {0, 2};
@@ -40,7 +40,8 @@ Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
   return kernel;
 }
 
-KernelObjective::KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs)
+KernelObjective::KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
+                                 const std::vector<int>& groups)
     : outputs_(outputs), trend_(kTrendVariance * inputs * inputs.transpose()) {
   const Index n = inputs.rows();
   trend_.array() += kTrendVariance;
@@ -50,6 +51,13 @@ KernelObjective::KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::Vec
     for (Index i = j + 1; i < n; ++i)
       squared_.row(pair++) = (inputs.row(i) - inputs.row(j)).array().square();
   }
+  if (groups.empty()) return;
+  together_.resize(pair);
+  pair = 0;
+  for (std::size_t j = 0; j < groups.size(); ++j) {
+    for (std::size_t i = j + 1; i < groups.size(); ++i)
+      together_[pair++] = groups[i] == groups[j] ? 1 : 0;
+  }
 }
 
 double KernelObjective::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) const {
@@ -58,6 +66,8 @@ double KernelObjective::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gr
   const Eigen::VectorXd weights = (-2 * x.head(d)).array().exp();  // 1 / l^2
   const double signal = std::exp(x[d]);
   const double scatter = std::exp(x[d + 1]);
+  const bool grouped = together_.size() > 0;
+  const double group = grouped ? std::exp(x[d + 2]) : 0;
 
   const Eigen::ArrayXd z = (5 * (squared_ * weights).array()).sqrt();
   const Eigen::ArrayXd decay = (-z).exp();
@@ -68,6 +78,10 @@ double KernelObjective::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gr
     const Index below = n - 1 - j;
     covariance.col(j).tail(below).array() += signal * matern.segment(pair, below);
     covariance(j, j) += signal + scatter;
+    if (grouped) {
+      covariance.col(j).tail(below).array() += group * together_.segment(pair, below);
+      covariance(j, j) += group;
+    }
     pair += below;
   }
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);  // reads the lower triangle only
@@ -91,6 +105,7 @@ double KernelObjective::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gr
   gradient.head(d) = (squared_.transpose() * slope).cwiseProduct(weights);
   gradient[d] = signal * ((sensitivity * matern).sum() + 0.5 * diagonal);
   gradient[d + 1] = 0.5 * scatter * diagonal;
+  if (grouped) gradient[d + 2] = group * ((sensitivity * together_).sum() + 0.5 * diagonal);
 
   for (Index j = 0; j < x.size(); ++j) {
     const LogPrior prior = HyperPrior(j, d);

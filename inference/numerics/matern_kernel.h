@@ -3,6 +3,7 @@
 // outputs are taken as scaled to zero mean and unit standard deviation.
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace calib::inference {
 
@@ -29,19 +30,23 @@ Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
 /// likelihood [Rasmussen & Williams 2006, Eqs. 5.8, 5.9] and the priors
 ///   ln l_j ~ N(ln 3, 1), ln s ~ N(0, 2^2), ln v ~ N(ln 1e-3, 3^2),
 /// chosen weak: smooth over the training set unless the outputs say otherwise. A SmoothFunction of
-/// d + 2 variables; +infinity where the covariance matrix cannot be factorised.
-/// Keeps a reference to the outputs. Thread safety: const after construction.
+/// d + 2 variables; +infinity where the covariance matrix cannot be factorised. With groups, runs
+/// of one group share a departure of variance g: a last variable ln g ~ N(ln 1e-3, 3^2). Keeps a
+/// reference to the outputs. Thread safety: const after construction.
 class KernelObjective {
  public:
-  /// The objective given n runs. inputs: n x d; outputs: n, which outlives this object
-  KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs);
-  /// The value at x; writes its d + 2 derivatives to `gradient`, which has the size of x.
+  /// The objective given n runs. inputs: n x d; outputs: n, which outlives this object; groups: n
+  /// numbers of any value, or none
+  KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
+                  const std::vector<int>& groups = {});
+  /// The value at x; writes its derivatives to `gradient`, which has the size of x.
   double operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) const;
 
  private:
   const Eigen::VectorXd& outputs_;
   Eigen::MatrixXd trend_;    // n x n
   Eigen::MatrixXd squared_;  // pairs x d: squared differences, pairs (i > j) by columns j
+  Eigen::ArrayXd together_;  // pairs: 1 where both runs are of one group; empty without groups
 };
 
 }  // namespace calib::inference

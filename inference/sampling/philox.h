@@ -34,6 +34,8 @@ enum class StreamPurpose : std::uint64_t {
   kDiagnosisForecast = 33,
   kMainDesign = 34,
   kUnseenMember = 35,
+  kAdaptiveDesign = 36,
+  kAdaptiveErrors = 37,
 };
 
 /// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,

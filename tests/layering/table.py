@@ -6,7 +6,7 @@ ORDER = """
 dem        elementary < geometry < particles < model < contact < contact/laws < effects/shared < effects < formula < neighbor
            < dynamics < measure < measure/observables < lab_tests/shared < lab_tests < registry < simulate
 inference  numerics < sampling < prior < data < mixture < scatter < evidence < filter < tmcmc < surrogate < emulator
-           < { diagnosis discrepancy prediction sensitivity }
+           < { diagnosis discrepancy prediction sensitivity } < adaptive
 proto      calib/v1 < rpc
 worker     program < engine < .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
