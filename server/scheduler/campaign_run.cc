@@ -64,6 +64,7 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   arrived_.clear();
   evaluations_.clear();
   by_status_.clear();
+  by_digest_.clear();
   return Extend(reader);
 }
 
@@ -78,6 +79,7 @@ void CampaignRun::Fill(CampaignRun&& reloaded) {
   ++changes_;
   evaluations_ = std::move(reloaded.evaluations_);
   by_status_ = std::move(reloaded.by_status_);
+  by_digest_ = std::move(reloaded.by_digest_);
   samples_ = std::move(reloaded.samples_);
   stop_below_ = std::move(reloaded.stop_below_);
   arrived_ = std::move(reloaded.arrived_);
@@ -126,6 +128,9 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
                                     .rest_after = evaluation.rest_after,
                                     .held_in = evaluation.held_in,
                                     .digest = evaluation.digest};
+    if (!evaluation.digest.empty()) {
+      by_digest_.emplace(evaluation.digest, evaluation.key);
+    }
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
   }
   if (everything) {
@@ -209,6 +214,13 @@ void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest)
   Evaluation& evaluation = evaluations_[key];
   evaluation.missing = {steps.begin(), steps.end()};
   evaluation.held_in.clear();
+  const auto [first, last] = by_digest_.equal_range(evaluation.digest);
+  if (const auto before =
+          std::find_if(first, last, [&key](const auto& item) { return item.second == key; });
+      before != last) {
+    by_digest_.erase(before);
+  }
+  by_digest_.emplace(digest, key);
   evaluation.digest = digest;
   of_other_mechanics_.erase(key);
   SetStatus(key, EvaluationStatus::kWaiting, 0);
@@ -228,6 +240,32 @@ std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
   return found == by_status_.end()
              ? std::vector<EvaluationKey>{}
              : std::vector<EvaluationKey>(found->second.begin(), found->second.end());
+}
+
+std::size_t CampaignRun::Count(EvaluationStatus status) const {
+  const auto found = by_status_.find(status);
+  return found == by_status_.end() ? 0 : found->second.size();
+}
+
+std::vector<EvaluationKey> CampaignRun::OfSample(int sample) const {
+  std::vector<EvaluationKey> keys;
+  for (auto it = evaluations_.lower_bound({id_, sample, 0});
+       it != evaluations_.end() && it->first.sample == sample; ++it) {
+    keys.push_back(it->first);
+  }
+  return keys;
+}
+
+std::vector<EvaluationKey> CampaignRun::WaitingFor(const std::string& digest) const {
+  std::vector<EvaluationKey> waiting;
+  const auto [first, last] = by_digest_.equal_range(digest);
+  for (auto it = first; it != last; ++it) {
+    if (evaluations_.at(it->second).status == EvaluationStatus::kWaiting) {
+      waiting.push_back(it->second);
+    }
+  }
+  std::sort(waiting.begin(), waiting.end());
+  return waiting;
 }
 
 std::vector<EvaluationKey> CampaignRun::UnknownOfRunningIteration() const {

@@ -67,6 +67,11 @@ class CampaignRun {
   Evaluation* Find(const store::EvaluationKey& key);
   /// Keys with this status, in order.
   std::vector<store::EvaluationKey> With(store::EvaluationStatus status) const;
+  std::size_t Count(store::EvaluationStatus status) const;
+  /// Of one sample, in order.
+  std::vector<store::EvaluationKey> OfSample(int sample) const;
+  /// Those that wait and have this digest, which is not empty.
+  std::vector<store::EvaluationKey> WaitingFor(const std::string& digest) const;
   /// What a program failed on as often as it may, of samples that no posterior has taken in yet.
   std::vector<store::EvaluationKey> UnknownOfRunningIteration() const;
   bool AllTerminal() const;
@@ -162,6 +167,7 @@ class CampaignRun {
   std::optional<inference::GaussianLikelihood> likelihood_;
   std::map<store::EvaluationKey, Evaluation> evaluations_;
   std::map<store::EvaluationStatus, std::set<store::EvaluationKey>> by_status_;
+  std::multimap<std::string, store::EvaluationKey> by_digest_;  // where there is one
   /// Planned by a program with other mechanics and not over when they were read, with their digests
   /// by this one.
   std::map<store::EvaluationKey, std::string> of_other_mechanics_;
