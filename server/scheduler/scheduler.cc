@@ -48,6 +48,7 @@ absl::Status Scheduler::Load() {
   ASSIGN_OR_RETURN(const auto last_campaign, reader.LastCampaign());
   ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   ASSIGN_OR_RETURN(const auto attempts, reader.ActiveAttempts());
+  ticked_ = ports_.Now();
   last_attempt_ = last_attempt;
   last_campaign_ = last_campaign;
   for (const store::CampaignRecord& record : campaigns) {

@@ -27,7 +27,7 @@ namespace calib::scheduler {
 
 struct SchedulerOptions {
   std::chrono::milliseconds lease{
-      15'000};  ///< an attempt is lost when nothing was heard for this long
+      15'000};  ///< an attempt is lost when nothing was heard of its worker for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers are told to speak at least this often
   int most_slots = 1024;                       ///< of one worker, >= 1
   int most_campaigns = 1000;                   ///< that are not over, >= 1
@@ -82,7 +82,8 @@ class Scheduler {
   /// Workers that were turned away by Connected() and have not come back since; the last time of
   /// each name, of the sixteen names that came last.
   std::vector<v1::RefusedWorker> Refused() const { return refused_; }
-  /// Gives up leases that have run out. Call a few times per lease.
+  /// Gives up leases that have run out. Call at least four times per lease: where one call is late
+  /// by half a lease the server has stood still, and nothing ends for a lease time from then.
   void Tick();
 
   // ---- campaigns (scheduler.cc) ----
@@ -260,7 +261,8 @@ class Scheduler {
   std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::pair<double, int>>
-      durations_;  // seconds and number of ended attempts
+      durations_;               // seconds and number of ended attempts
+  Clock::time_point ticked_{};  // or loaded
   std::int64_t last_attempt_ = 0;
   std::int64_t last_campaign_ = 0;
   std::uint64_t version_ = 0;

@@ -22,6 +22,9 @@ constexpr std::chrono::minutes kRemembered{10};
 /// Attempts that a worker may name, by slot: those leased, and those of a lease that has expired
 /// while it was frozen, twice over.
 constexpr int kAttemptsPerSlot = 4;
+/// Share of a lease: a server whose tick is later has stood still. Chosen: twice what is between
+/// ticks at most (Core), and the other half is time enough to be heard in.
+constexpr double kStoodStill = 0.5;
 /// Attempts that one heartbeat gets refused; the next gets the rest. Chosen: some times those of a
 /// node with many slots, and few enough that a flood of heartbeats is no flood of answers.
 constexpr int kRefusedAtOnce = 64;
@@ -69,7 +72,7 @@ absl::Status Scheduler::Admit(const v1::Hello& hello) const {
                      " offers other contacts, effects or tests than the server: update the node"));
   }
   const Clock::time_point now = ports_.Now();
-  if (workers_.IsAnother(hello, now - options_.lease)) {
+  if (workers_.IsAnother(hello, leases_.HeardSince(now))) {
     const Clock::duration silence = now - workers_.all().at(hello.name()).heard;
     return absl::AlreadyExistsError(
         absl::StrCat("a worker ", hello.name(), " is connected already and was heard ",
@@ -107,8 +110,9 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   }
 
   const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
+  leases_.Heard(hello.name(), now);
   for (const std::int64_t attempt : held) {
-    if (!leases_.Renew(attempt, hello.name(), now)) {
+    if (!leases_.Named(attempt, hello.name(), now)) {
       Refuse(session, attempt);
     }
   }
@@ -171,10 +175,22 @@ absl::Status Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heart
   const Clock::time_point now = ports_.Now();
   int refused = 0;
   for (const std::int64_t attempt : heartbeat.attempts()) {
-    if (!leases_.Renew(attempt, worker->hello.name(), now) && refused < kRefusedAtOnce) {
+    if (!leases_.Named(attempt, worker->hello.name(), now) && refused < kRefusedAtOnce) {
       Refuse(session, attempt);
       ++refused;
     }
+  }
+  const std::vector<LeaseEntry> unnamed = leases_.Unnamed(worker->hello.name(), now);
+  for (const LeaseEntry& lease : unnamed) {
+    Release(lease.attempt);
+    GiveBack(lease,
+             Because(lease.attempt, absl::StrCat("worker ", lease.worker, " has not named it for ",
+                                                 options_.lease.count(), " ms")),
+             AttemptOutcome::kLost, true);
+    Refuse(session, lease.attempt);
+  }
+  if (!unnamed.empty()) {
+    Dispatch();
   }
   return absl::OkStatus();
 }
@@ -197,7 +213,7 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   if (worker == nullptr) {
     return;
   }
-  if (!leases_.Renew(batch.attempt(), worker->hello.name(), ports_.Now())) {
+  if (!leases_.Named(batch.attempt(), worker->hello.name(), ports_.Now())) {
     Refuse(session, batch.attempt());
     return;
   }
@@ -555,6 +571,9 @@ std::optional<LeaseEntry> Scheduler::Release(std::int64_t attempt) {
 const WorkerEntry* Scheduler::Heard(std::int64_t session) {
   bool was_silent = false;
   const WorkerEntry* worker = workers_.Heard(session, ports_.Now(), &was_silent);
+  if (worker != nullptr) {
+    leases_.Heard(worker->hello.name(), ports_.Now());
+  }
   if (was_silent) {
     Dispatch();
   }
@@ -614,6 +633,9 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
 
 void Scheduler::Tick() {
   const Clock::time_point now = ports_.Now();
+  if (now - std::exchange(ticked_, now) > kStoodStill * options_.lease) {
+    leases_.Pardon(now);
+  }
   for (const LeaseEntry& lease : leases_.Expired(now)) {
     Release(lease.attempt);
     GiveBack(lease,
@@ -624,7 +646,7 @@ void Scheduler::Tick() {
       Refuse(worker->session, lease.attempt);
     }
   }
-  workers_.Review(now - options_.lease, now - kRemembered);
+  workers_.Review(leases_.HeardSince(now), now - kRemembered);
   for (auto& [campaign, arrivals] : arrivals_) {
     if (arrivals.HasCeased(now)) {
       Changed(campaign);

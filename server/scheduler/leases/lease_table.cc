@@ -1,24 +1,18 @@
 #include "server/scheduler/leases/lease_table.h"
 
+#include <algorithm>
+
 namespace calib::scheduler {
-namespace {
-
-template <typename Map, typename Key>
-void Take(Map& map, const Key& key, std::int64_t attempt) {
-  const auto found = map.find(key);
-  found->second.erase(attempt);
-  if (found->second.empty()) {
-    map.erase(found);
-  }
-}
-
-}  // namespace
-
 void LeaseTable::Grant(LeaseEntry lease) {
-  lease.expires = lease.started + lease_;
-  of_worker_[lease.worker].insert(lease.attempt);
+  lease.named = lease.started;
+  const auto [holder, is_new] = of_worker_.try_emplace(lease.worker);
+  holder->second.attempts.insert(lease.attempt);
+  if (is_new) {
+    holder->second.heard = lease.started;
+    holder->second.look_at = lease.started + lease_;
+    looks_.emplace(holder->second.look_at, lease.worker);
+  }
   of_campaign_[lease.key.campaign].insert(lease.attempt);
-  ends_.emplace(lease.expires, lease.attempt);
   leases_.emplace(lease.attempt, std::move(lease));
 }
 
@@ -27,15 +21,23 @@ const LeaseEntry* LeaseTable::Find(std::int64_t attempt, const std::string& work
   return it != leases_.end() && it->second.worker == worker ? &it->second : nullptr;
 }
 
-bool LeaseTable::Renew(std::int64_t attempt, const std::string& worker, Clock::time_point now) {
+void LeaseTable::Heard(const std::string& worker, Clock::time_point now) {
+  if (const auto holder = of_worker_.find(worker); holder != of_worker_.end()) {
+    holder->second.heard = now;
+  }
+}
+
+bool LeaseTable::Named(std::int64_t attempt, const std::string& worker, Clock::time_point now) {
   const auto it = leases_.find(attempt);
   if (it == leases_.end() || it->second.worker != worker) {
     return false;
   }
-  ends_.erase({it->second.expires, attempt});
-  it->second.expires = now + lease_;
-  ends_.emplace(it->second.expires, attempt);
+  it->second.named = now;
   return true;
+}
+
+Clock::time_point LeaseTable::HeardSince(Clock::time_point now) const {
+  return now - lease_ < pardoned_ ? Clock::time_point::min() : now - lease_;
 }
 
 std::optional<LeaseEntry> LeaseTable::Release(std::int64_t attempt) {
@@ -44,18 +46,56 @@ std::optional<LeaseEntry> LeaseTable::Release(std::int64_t attempt) {
     return std::nullopt;
   }
   LeaseEntry lease = std::move(node.mapped());
-  Take(of_worker_, lease.worker, attempt);
-  Take(of_campaign_, lease.key.campaign, attempt);
-  ends_.erase({lease.expires, attempt});
+  const auto holder = of_worker_.find(lease.worker);
+  holder->second.attempts.erase(attempt);
+  if (holder->second.attempts.empty()) {
+    looks_.erase({holder->second.look_at, lease.worker});
+    of_worker_.erase(holder);
+  }
+  const auto campaign = of_campaign_.find(lease.key.campaign);
+  campaign->second.erase(attempt);
+  if (campaign->second.empty()) {
+    of_campaign_.erase(campaign);
+  }
   return lease;
 }
 
-std::vector<LeaseEntry> LeaseTable::Expired(Clock::time_point now) const {
+std::vector<LeaseEntry> LeaseTable::Expired(Clock::time_point now) {
   Attempts expired;
-  for (auto end = ends_.begin(); end != ends_.end() && end->first < now; ++end) {
-    expired.insert(end->second);
+  std::vector<decltype(looks_)::value_type> next;
+  while (!looks_.empty() && looks_.begin()->first < now) {
+    const std::string worker = looks_.begin()->second;
+    looks_.erase(looks_.begin());
+    Holder& holder = of_worker_.at(worker);
+    holder.look_at = Clock::time_point::max();
+    for (const std::int64_t attempt : holder.attempts) {
+      const Clock::time_point end =
+          std::max({holder.heard, leases_.at(attempt).started, pardoned_}) + lease_;
+      holder.look_at = std::min(holder.look_at, end);
+      if (end < now) {
+        expired.insert(attempt);
+      }
+    }
+    next.emplace_back(holder.look_at, worker);
   }
+  looks_.insert(next.begin(), next.end());
   return Entries(expired);
+}
+
+std::vector<LeaseEntry> LeaseTable::Unnamed(const std::string& worker,
+                                            Clock::time_point now) const {
+  std::vector<LeaseEntry> unnamed;
+  const auto holder = of_worker_.find(worker);
+  if (holder == of_worker_.end()) {
+    return unnamed;
+  }
+  for (const std::int64_t attempt : holder->second.attempts) {
+    const LeaseEntry& lease = leases_.at(attempt);
+    if (std::max(lease.named, pardoned_) + lease_ < now) {
+      unnamed.push_back(lease);
+    }
+  }
+  return unnamed;
 }
 
 std::vector<LeaseEntry> LeaseTable::Entries(const Attempts& attempts) const {
@@ -69,7 +109,7 @@ std::vector<LeaseEntry> LeaseTable::Entries(const Attempts& attempts) const {
 
 std::vector<LeaseEntry> LeaseTable::OfWorker(const std::string& worker) const {
   const auto found = of_worker_.find(worker);
-  return found == of_worker_.end() ? std::vector<LeaseEntry>{} : Entries(found->second);
+  return found == of_worker_.end() ? std::vector<LeaseEntry>{} : Entries(found->second.attempts);
 }
 
 std::vector<LeaseEntry> LeaseTable::OfCampaign(std::int64_t campaign) const {
@@ -79,7 +119,7 @@ std::vector<LeaseEntry> LeaseTable::OfCampaign(std::int64_t campaign) const {
 
 int LeaseTable::Busy(const std::string& worker) const {
   const auto found = of_worker_.find(worker);
-  return found == of_worker_.end() ? 0 : static_cast<int>(found->second.size());
+  return found == of_worker_.end() ? 0 : static_cast<int>(found->second.attempts.size());
 }
 
 }  // namespace calib::scheduler

@@ -19,7 +19,7 @@ TEST(LeaseTable, LeaseLastsUntilNothingWasHeardForItsLength) {
   LeaseTable table(seconds(10));
   table.Grant(Lease(7, "w"));
   EXPECT_TRUE(table.Expired(kStart + seconds(10)).empty());
-  EXPECT_TRUE(table.Renew(7, "w", kStart + seconds(10)));
+  table.Heard("w", kStart + seconds(10));
   EXPECT_TRUE(table.Expired(kStart + seconds(20)).empty());
   const auto expired = table.Expired(kStart + seconds(21));
   ASSERT_EQ(expired.size(), 1U);
@@ -27,13 +27,13 @@ TEST(LeaseTable, LeaseLastsUntilNothingWasHeardForItsLength) {
   EXPECT_EQ(expired.front().key, kKey);
   EXPECT_TRUE(table.Release(7).has_value());
   EXPECT_TRUE(table.Expired(kStart + seconds(21)).empty());
-  EXPECT_FALSE(table.Renew(7, "w", kStart + seconds(21))) << "what is released stays lost";
+  EXPECT_FALSE(table.Named(7, "w", kStart + seconds(21))) << "what is released stays lost";
 }
 
 TEST(LeaseTable, OnlyItsWorkerHoldsAnAttempt) {
   LeaseTable table(seconds(10));
   table.Grant(Lease(7, "w"));
-  EXPECT_FALSE(table.Renew(7, "other", kStart));
+  EXPECT_FALSE(table.Named(7, "other", kStart));
   EXPECT_EQ(table.Find(7, "other"), nullptr);
   ASSERT_NE(table.Find(7, "w"), nullptr);
   EXPECT_EQ(table.Busy("w"), 1);
@@ -54,15 +54,57 @@ TEST(LeaseTable, ReleasedAttemptIsGone) {
   EXPECT_EQ(table.Busy("w"), 1);
 }
 
-TEST(LeaseTable, ExpiredLeasesComeInOrderOfAttemptWhateverEndsFirst) {
+TEST(LeaseTable, ExpiredLeasesComeInOrderOfAttemptWhoeverFallsSilentFirst) {
   LeaseTable table(seconds(10));
-  for (const std::int64_t attempt : {9, 7, 8}) table.Grant(Lease(attempt, "w"));
-  EXPECT_TRUE(table.Renew(7, "w", kStart + seconds(2)));
-  EXPECT_TRUE(table.Renew(8, "w", kStart + seconds(1)));
+  table.Grant(Lease(9, "a"));
+  table.Grant(Lease(7, "b"));
+  table.Grant(Lease(8, "a"));
+  table.Heard("b", kStart + seconds(2));
   const auto expired = table.Expired(kStart + seconds(13));
   ASSERT_EQ(expired.size(), 3U);
   EXPECT_EQ(expired[0].attempt, 7);
   EXPECT_EQ(expired[2].attempt, 9);
+  EXPECT_EQ(table.Expired(kStart + seconds(13)).size(), 3U) << "until they are released";
+}
+
+TEST(LeaseTable, WhoIsHeardKeepsAllThatItHoldsButWhatItNeverNames) {
+  LeaseTable table(seconds(10));
+  table.Grant(Lease(7, "w"));
+  table.Grant(Lease(8, "w"));
+  for (int t = 1; t <= 30; ++t) {
+    table.Heard("w", kStart + seconds(t));
+    EXPECT_TRUE(table.Named(7, "w", kStart + seconds(t)));
+    EXPECT_TRUE(table.Expired(kStart + seconds(t)).empty());
+  }
+  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(10)).empty());
+  const auto unnamed = table.Unnamed("w", kStart + seconds(11));
+  ASSERT_EQ(unnamed.size(), 1U);
+  EXPECT_EQ(unnamed.front().attempt, 8);
+}
+
+TEST(LeaseTable, ALeaseGrantedLateLastsItsLength) {
+  LeaseTable table(seconds(10));
+  table.Grant(Lease(7, "w"));
+  LeaseEntry late = Lease(8, "w");
+  late.started = kStart + seconds(8);
+  table.Grant(late);
+  auto expired = table.Expired(kStart + seconds(11));
+  ASSERT_EQ(expired.size(), 1U);
+  EXPECT_EQ(expired.front().attempt, 7);
+  table.Release(7);
+  EXPECT_TRUE(table.Expired(kStart + seconds(18)).empty());
+  EXPECT_EQ(table.Expired(kStart + seconds(19)).size(), 1U);
+}
+
+TEST(LeaseTable, AfterAStandstillNothingEndsForALeaseTime) {
+  LeaseTable table(seconds(10));
+  table.Grant(Lease(7, "w"));
+  table.Pardon(kStart + seconds(100));
+  EXPECT_TRUE(table.Expired(kStart + seconds(110)).empty());
+  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(110)).empty());
+  EXPECT_LE(table.HeardSince(kStart + seconds(109)), kStart) << "nobody is silent yet";
+  EXPECT_EQ(table.Unnamed("w", kStart + seconds(111)).size(), 1U);
+  EXPECT_EQ(table.Expired(kStart + seconds(111)).size(), 1U);
 }
 
 }  // namespace

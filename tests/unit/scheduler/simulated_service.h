@@ -78,6 +78,8 @@ class SimulatedService {
   void SendEnd(std::int64_t session, std::int64_t attempt, v1::Finished::Outcome outcome,
                const std::string& reason = "");
   void Advance(std::chrono::milliseconds time);
+  /// Time goes by without a tick of the server's.
+  void StandStill(std::chrono::milliseconds time);
   /// Lets workers run, die, fall silent and come back at random until the campaign is over; the
   /// server is restarted now and then. calm: nothing goes wrong, one worker.
   void RunToEnd(unsigned seed, bool calm);
