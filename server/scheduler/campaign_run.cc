@@ -123,8 +123,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     }
   }
   for (const store::EvaluationRecord& evaluation : added) {
-    const auto steps = definition_->LoadSteps(evaluation.key.experiment);
-    evaluations_[evaluation.key] = {.missing = {steps.begin(), steps.end()},
+    evaluations_[evaluation.key] = {.missing = MissingSteps(PathLength(evaluation.key.experiment)),
                                     .rest_after = evaluation.rest_after,
                                     .held_in = evaluation.held_in,
                                     .digest = evaluation.digest};
@@ -205,14 +204,13 @@ bool CampaignRun::HasBegun() const {
   return std::any_of(evaluations_.begin(), evaluations_.end(), [this](const auto& entry) {
     const auto& [key, evaluation] = entry;
     return campaign::IsTerminal(evaluation.status) ||
-           evaluation.missing.size() < definition_->LoadSteps(key.experiment).size();
+           evaluation.missing.size() < PathLength(key.experiment);
   });
 }
 
 void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest) {
-  const auto steps = definition_->LoadSteps(key.experiment);
   Evaluation& evaluation = evaluations_[key];
-  evaluation.missing = {steps.begin(), steps.end()};
+  evaluation.missing = MissingSteps(PathLength(key.experiment));
   evaluation.held_in.clear();
   const auto [first, last] = by_digest_.equal_range(evaluation.digest);
   if (const auto before =
@@ -335,18 +333,11 @@ std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
 
 bool CampaignRun::HasArrived(const EvaluationKey& key) const {
   const Evaluation& evaluation = evaluations_.at(key);
-  if (!evaluation.rest_after.has_value()) {
-    return evaluation.missing.empty();
-  }
-  for (const int step : definition_->LoadSteps(key.experiment)) {
-    if (evaluation.missing.count(step) > 0) {
-      return false;
-    }
-    if (step == *evaluation.rest_after) {
-      break;
-    }
-  }
-  return true;
+  const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
+  const auto rests_at =
+      evaluation.rest_after.has_value() ? positions.find(*evaluation.rest_after) : positions.end();
+  return rests_at == positions.end() ? evaluation.missing.empty()
+                                     : !evaluation.missing.AnyUpTo(rests_at->second);
 }
 
 bool CampaignRun::IsOfRunningIteration(int sample) const {
@@ -357,7 +348,10 @@ void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
   if (observables.empty()) return;  // what a program told besides
   ++changes_;
-  evaluations_[key].missing.erase(load_step);
+  const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
+  if (const auto position = positions.find(load_step); position != positions.end()) {
+    evaluations_[key].missing.Erase(position->second);
+  }
   if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
     definition_->readings.Place(key.experiment, load_step, observables, found->second.predictions);
   }

@@ -141,6 +141,7 @@ class Scheduler {
   /// Leases what waits, the first evaluation first, each to the worker with the most free slots
   /// that may run it; one that rests where a worker, which is there, can go on with it, waits for
   /// that.
+  /// Not all in one turn where they are many: what workers say meanwhile is heard in between.
   void Dispatch();
   /// The worker that should take runs of this group now; nullptr: none.
   const WorkerEntry* WorkerFor(const WaitingRuns::Group& group);
@@ -261,7 +262,8 @@ class Scheduler {
   std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::pair<double, int>>
-      durations_;               // seconds and number of ended attempts
+      durations_;  // seconds and number of ended attempts
+  bool dispatches_later_ = false;
   Clock::time_point ticked_{};  // or loaded
   std::int64_t last_attempt_ = 0;
   std::int64_t last_campaign_ = 0;

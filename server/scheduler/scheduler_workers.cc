@@ -22,6 +22,9 @@ constexpr std::chrono::minutes kRemembered{10};
 /// Attempts that a worker may name, by slot: those leased, and those of a lease that has expired
 /// while it was frozen, twice over.
 constexpr int kAttemptsPerSlot = 4;
+/// Leases granted in one turn of the strand. Chosen: some milliseconds of it, at a tenth of one
+/// each.
+constexpr int kGrantsPerTurn = 64;
 /// Share of a lease: a server whose tick is later has stood still. Chosen: twice what is between
 /// ticks at most (Core), and the other half is time enough to be heard in.
 constexpr double kStoodStill = 0.5;
@@ -532,13 +535,23 @@ void Scheduler::Dispatch() {
   for (const WaitingRuns::Group& group : waiting_.Groups()) {
     enter(group);
   }
-  while (!firsts.empty() && workers_.AnyFree()) {
+  for (int granted = 0; !firsts.empty() && workers_.AnyFree();) {
+    if (granted == kGrantsPerTurn) {
+      if (!std::exchange(dispatches_later_, true)) {
+        ports_.Later([this] {
+          dispatches_later_ = false;
+          Dispatch();
+        });
+      }
+      return;
+    }
     const auto [key, group] = *firsts.begin();
     firsts.erase(firsts.begin());
     if (WaitsForAnother(key)) {  // since another group was leased the same
       enter(group);
     } else if (const WorkerEntry* worker = WorkerFor(group); worker != nullptr) {
       Grant(*worker, key);
+      ++granted;
       enter(group);
     }
   }

@@ -48,6 +48,17 @@ TEST(CampaignLife, SilentWorkersAttemptGoesToAnotherAndItsLateWordsAreRefused) {
   EXPECT_TRUE(service.Read().States(1)->empty());
 }
 
+TEST(CampaignLife, ALargeNodeIsFilledInSeveralTurns) {
+  constexpr int kSlots = 200;
+  SimulatedService service("large_node");
+  service.Submit(testing::MakeSmallCampaign({.samples = kSlots, .max_iterations = 2}));
+  v1::Hello hello = testing::MatchingHello("large", kSlots);
+  ASSERT_TRUE(service.scheduler().Connected(1, hello).ok());
+  EXPECT_LT(service.scheduler().Workers().front().busy(), kSlots) << "others are heard in between";
+  service.ports().Run();
+  EXPECT_EQ(service.scheduler().Workers().front().busy(), kSlots);
+}
+
 TEST(CampaignLife, AnyWordOfAWorkerKeepsAllThatItWorksOn) {
   SimulatedService service("any_word");
   service.Submit(Small());

@@ -39,6 +39,7 @@ class SimulatedPorts final : public Ports {
   absl::StatusOr<store::Reader> Read() override;
   void Compute(std::function<std::function<void()>()> work) override;
   void Load(std::function<std::function<void()>()> work) override { Compute(std::move(work)); }
+  void Later(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
   std::chrono::steady_clock::time_point Now() override { return now; }
