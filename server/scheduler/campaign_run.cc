@@ -64,6 +64,7 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   arrived_.clear();
   evaluations_.clear();
   by_status_.clear();
+  by_digest_.clear();
   return Extend(reader);
 }
 
@@ -78,6 +79,7 @@ void CampaignRun::Fill(CampaignRun&& reloaded) {
   ++changes_;
   evaluations_ = std::move(reloaded.evaluations_);
   by_status_ = std::move(reloaded.by_status_);
+  by_digest_ = std::move(reloaded.by_digest_);
   samples_ = std::move(reloaded.samples_);
   stop_below_ = std::move(reloaded.stop_below_);
   arrived_ = std::move(reloaded.arrived_);
@@ -121,11 +123,13 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     }
   }
   for (const store::EvaluationRecord& evaluation : added) {
-    const auto steps = definition_->LoadSteps(evaluation.key.experiment);
-    evaluations_[evaluation.key] = {.missing = {steps.begin(), steps.end()},
+    evaluations_[evaluation.key] = {.missing = MissingSteps(PathLength(evaluation.key.experiment)),
                                     .rest_after = evaluation.rest_after,
                                     .held_in = evaluation.held_in,
                                     .digest = evaluation.digest};
+    if (!evaluation.digest.empty()) {
+      by_digest_.emplace(evaluation.digest, evaluation.key);
+    }
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
   }
   if (everything) {
@@ -200,15 +204,21 @@ bool CampaignRun::HasBegun() const {
   return std::any_of(evaluations_.begin(), evaluations_.end(), [this](const auto& entry) {
     const auto& [key, evaluation] = entry;
     return campaign::IsTerminal(evaluation.status) ||
-           evaluation.missing.size() < definition_->LoadSteps(key.experiment).size();
+           evaluation.missing.size() < PathLength(key.experiment);
   });
 }
 
 void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest) {
-  const auto steps = definition_->LoadSteps(key.experiment);
   Evaluation& evaluation = evaluations_[key];
-  evaluation.missing = {steps.begin(), steps.end()};
+  evaluation.missing = MissingSteps(PathLength(key.experiment));
   evaluation.held_in.clear();
+  const auto [first, last] = by_digest_.equal_range(evaluation.digest);
+  if (const auto before =
+          std::find_if(first, last, [&key](const auto& item) { return item.second == key; });
+      before != last) {
+    by_digest_.erase(before);
+  }
+  by_digest_.emplace(digest, key);
   evaluation.digest = digest;
   of_other_mechanics_.erase(key);
   SetStatus(key, EvaluationStatus::kWaiting, 0);
@@ -228,6 +238,32 @@ std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
   return found == by_status_.end()
              ? std::vector<EvaluationKey>{}
              : std::vector<EvaluationKey>(found->second.begin(), found->second.end());
+}
+
+std::size_t CampaignRun::Count(EvaluationStatus status) const {
+  const auto found = by_status_.find(status);
+  return found == by_status_.end() ? 0 : found->second.size();
+}
+
+std::vector<EvaluationKey> CampaignRun::OfSample(int sample) const {
+  std::vector<EvaluationKey> keys;
+  for (auto it = evaluations_.lower_bound({id_, sample, 0});
+       it != evaluations_.end() && it->first.sample == sample; ++it) {
+    keys.push_back(it->first);
+  }
+  return keys;
+}
+
+std::vector<EvaluationKey> CampaignRun::WaitingFor(const std::string& digest) const {
+  std::vector<EvaluationKey> waiting;
+  const auto [first, last] = by_digest_.equal_range(digest);
+  for (auto it = first; it != last; ++it) {
+    if (evaluations_.at(it->second).status == EvaluationStatus::kWaiting) {
+      waiting.push_back(it->second);
+    }
+  }
+  std::sort(waiting.begin(), waiting.end());
+  return waiting;
 }
 
 std::vector<EvaluationKey> CampaignRun::UnknownOfRunningIteration() const {
@@ -297,18 +333,11 @@ std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
 
 bool CampaignRun::HasArrived(const EvaluationKey& key) const {
   const Evaluation& evaluation = evaluations_.at(key);
-  if (!evaluation.rest_after.has_value()) {
-    return evaluation.missing.empty();
-  }
-  for (const int step : definition_->LoadSteps(key.experiment)) {
-    if (evaluation.missing.count(step) > 0) {
-      return false;
-    }
-    if (step == *evaluation.rest_after) {
-      break;
-    }
-  }
-  return true;
+  const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
+  const auto rests_at =
+      evaluation.rest_after.has_value() ? positions.find(*evaluation.rest_after) : positions.end();
+  return rests_at == positions.end() ? evaluation.missing.empty()
+                                     : !evaluation.missing.AnyUpTo(rests_at->second);
 }
 
 bool CampaignRun::IsOfRunningIteration(int sample) const {
@@ -319,7 +348,10 @@ void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
   if (observables.empty()) return;  // what a program told besides
   ++changes_;
-  evaluations_[key].missing.erase(load_step);
+  const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
+  if (const auto position = positions.find(load_step); position != positions.end()) {
+    evaluations_[key].missing.Erase(position->second);
+  }
   if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
     definition_->readings.Place(key.experiment, load_step, observables, found->second.predictions);
   }

@@ -29,6 +29,30 @@ struct LiveView {
   double best_misfit = 0;
 };
 
+/// Load steps of a path that are not yet there, a bit each: ten thousands of evaluations have some.
+/// Not thread-safe.
+class MissingSteps {
+ public:
+  MissingSteps() = default;
+  explicit MissingSteps(std::size_t steps) : missing_(steps, true), count_(steps) {}
+  /// By position in the path.
+  void Erase(std::size_t position) {
+    count_ -= missing_[position] ? 1 : 0;
+    missing_[position] = false;
+  }
+  /// Whether any up to this position, itself included, is missing.
+  bool AnyUpTo(std::size_t position) const {
+    return std::find(missing_.begin(), missing_.begin() + static_cast<std::ptrdiff_t>(position) + 1,
+                     true) != missing_.begin() + static_cast<std::ptrdiff_t>(position) + 1;
+  }
+  std::size_t size() const { return count_; }
+  bool empty() const { return count_ == 0; }
+
+ private:
+  std::vector<bool> missing_;
+  std::size_t count_ = 0;
+};
+
 /// Not thread-safe.
 class CampaignRun {
  public:
@@ -38,7 +62,7 @@ class CampaignRun {
     /// Attempts of a program's run that were lost with their node since the server started; its
     /// own failures are `failures`.
     int losses = 0;
-    std::set<int> missing{};  ///< load steps not yet there
+    MissingSteps missing{};
     std::optional<int> rest_after{};
     std::string held_in{};  ///< see store::EvaluationRecord
     std::string digest{};
@@ -67,6 +91,11 @@ class CampaignRun {
   Evaluation* Find(const store::EvaluationKey& key);
   /// Keys with this status, in order.
   std::vector<store::EvaluationKey> With(store::EvaluationStatus status) const;
+  std::size_t Count(store::EvaluationStatus status) const;
+  /// Of one sample, in order.
+  std::vector<store::EvaluationKey> OfSample(int sample) const;
+  /// Those that wait and have this digest, which is not empty.
+  std::vector<store::EvaluationKey> WaitingFor(const std::string& digest) const;
   /// What a program failed on as often as it may, of samples that no posterior has taken in yet.
   std::vector<store::EvaluationKey> UnknownOfRunningIteration() const;
   bool AllTerminal() const;
@@ -162,6 +191,7 @@ class CampaignRun {
   std::optional<inference::GaussianLikelihood> likelihood_;
   std::map<store::EvaluationKey, Evaluation> evaluations_;
   std::map<store::EvaluationStatus, std::set<store::EvaluationKey>> by_status_;
+  std::multimap<std::string, store::EvaluationKey> by_digest_;  // where there is one
   /// Planned by a program with other mechanics and not over when they were read, with their digests
   /// by this one.
   std::map<store::EvaluationKey, std::string> of_other_mechanics_;

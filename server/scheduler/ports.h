@@ -27,6 +27,8 @@ class Ports {
   virtual void Compute(std::function<std::function<void()>()> work) = 0;
   /// The same of what takes seconds, not the minutes of a plan.
   virtual void Load(std::function<std::function<void()>()> work) = 0;
+  /// On the strand, after what waits there.
+  virtual void Later(std::function<void()> task) = 0;
   /// To the worker's stream of this session; ignored if that is gone.
   virtual void Send(std::int64_t session, v1::ServerMessage message) = 0;
   /// Ends a stream (a worker that came back over a new one).

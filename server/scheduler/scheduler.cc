@@ -48,6 +48,7 @@ absl::Status Scheduler::Load() {
   ASSIGN_OR_RETURN(const auto last_campaign, reader.LastCampaign());
   ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   ASSIGN_OR_RETURN(const auto attempts, reader.ActiveAttempts());
+  ticked_ = ports_.Now();
   last_attempt_ = last_attempt;
   last_campaign_ = last_campaign;
   for (const store::CampaignRecord& record : campaigns) {
@@ -57,9 +58,15 @@ absl::Status Scheduler::Load() {
   }
   for (const store::ActiveAttempt& attempt : attempts) {
     CampaignRun* run = FindRun(attempt.key.campaign);
-    leases_.Grant(attempt.id, attempt.key, attempt.worker, ports_.Now());
+    const LeaseEntry lease{.attempt = attempt.id,
+                           .key = attempt.key,
+                           .worker = attempt.worker,
+                           .shared = SharedDigest(attempt.key),
+                           .started = ports_.Now()};
     if (run == nullptr) {
-      GiveBack(*leases_.Release(attempt.id), {}, AttemptOutcome::kLost, false);
+      GiveBack(lease, {}, AttemptOutcome::kLost, false);
+    } else {
+      Hold(lease);
     }
   }
   for (auto& [id, run] : runs_) {
@@ -76,7 +83,7 @@ store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
   std::vector<store::AttemptEnd> ends;
   for (const LeaseEntry& lease : leases_.OfCampaign(run.id())) {
     if (others.count(lease.key) == 0) continue;
-    leases_.Release(lease.attempt);
+    Release(lease.attempt);
     v1::Finished finished;
     finished.set_attempt(lease.attempt);
     finished.set_reason("of other mechanics");
@@ -84,6 +91,7 @@ store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
   }
   for (const auto& [key, digest] : others) {
     run.BeginAnew(key, digest);
+    Offer(run, key.sample);
   }
   return [others, ends](Transaction& transaction) {
     for (const store::AttemptEnd& end : ends) {
@@ -195,12 +203,12 @@ void Scheduler::ReadAgain(std::int64_t campaign, const absl::Status& why) {
     return;
   }
   for (const LeaseEntry& lease : leases_.OfCampaign(campaign)) {
-    leases_.Release(lease.attempt);
+    Release(lease.attempt);
     if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
       Refuse(worker->session, lease.attempt);
     }
   }
-  std::erase_if(queue_, [campaign](const EvaluationKey& key) { return key.campaign == campaign; });
+  waiting_.TakeAll(campaign);
   runs_.erase(campaign);
   loading_.try_emplace(campaign);
   const std::string reason =
@@ -218,15 +226,12 @@ void Scheduler::ReadAgain(std::int64_t campaign, const absl::Status& why) {
 }
 
 void Scheduler::ReturnUnleased(CampaignRun& run) {
-  std::vector<EvaluationKey> unleased = run.With(EvaluationStatus::kRunning);
-  const auto leases = leases_.OfCampaign(run.id());
-  std::erase_if(unleased, [&leases](const EvaluationKey& key) {
-    return std::any_of(leases.begin(), leases.end(),
-                       [&key](const LeaseEntry& lease) { return lease.key == key; });
-  });
-  for (const EvaluationKey& key : unleased) {
+  std::set<EvaluationKey> leased;
+  for (const LeaseEntry& lease : leases_.OfCampaign(run.id())) leased.insert(lease.key);
+  for (const EvaluationKey& key : run.With(EvaluationStatus::kRunning)) {
+    if (leased.count(key) > 0) continue;
     const int failures = run.Find(key)->failures;
-    run.SetStatus(key, EvaluationStatus::kWaiting, failures);
+    SetStatus(run, key, EvaluationStatus::kWaiting, failures);
     Write(
         run.id(),
         [key, failures](Transaction& transaction) {
@@ -302,14 +307,35 @@ CampaignRun* Scheduler::LiveRun(std::int64_t campaign, const Reply& reply) {
 }
 
 void Scheduler::Enqueue(CampaignRun& run) {
-  const bool leasable = IsLeasable(run.state());
+  if (!IsLeasable(run.state())) {
+    waiting_.TakeAll(run.id());
+    return;
+  }
+  std::optional<int> last;
   for (const EvaluationKey& key : run.With(EvaluationStatus::kWaiting)) {
-    if (leasable) {
-      queue_.insert(key);
+    if (last != key.sample) {
+      Offer(run, key.sample);
+    }
+    last = key.sample;
+  }
+}
+
+void Scheduler::Offer(CampaignRun& run, int sample) {
+  for (const EvaluationKey& key : run.OfSample(sample)) {
+    const CampaignRun::Evaluation& evaluation = *run.Find(key);
+    if (evaluation.status == EvaluationStatus::kWaiting && IsLeasable(run.state()) &&
+        run.IsItsTurn(key)) {
+      waiting_.Put(key, evaluation.held_in);
     } else {
-      queue_.erase(key);
+      waiting_.Take(key);
     }
   }
+}
+
+void Scheduler::SetStatus(CampaignRun& run, const EvaluationKey& key, EvaluationStatus status,
+                          int failures) {
+  run.SetStatus(key, status, failures);
+  Offer(run, key.sample);  // it may now be the turn of another of its experiments
 }
 
 absl::Status Scheduler::WhyNoMore() const {
@@ -413,7 +439,7 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
     again.insert(again.end(), unknown.begin(), unknown.end());
     for (const EvaluationKey& key : again) {
       run->Find(key)->losses = 0;
-      run->SetStatus(key, EvaluationStatus::kWaiting, 0);
+      SetStatus(*run, key, EvaluationStatus::kWaiting, 0);
     }
   }
   SetState(
@@ -446,11 +472,11 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
   const auto held = leases_.OfCampaign(campaign);
   std::vector<store::AttemptEnd> ends;
   for (const LeaseEntry& lease : held) {
-    leases_.Release(lease.attempt);
+    Release(lease.attempt);
     v1::Finished finished;
     finished.set_attempt(lease.attempt);
     ends.push_back(ToRecord(finished, AttemptOutcome::kCancelled));
-    run->SetStatus(lease.key, EvaluationStatus::kWaiting, 0);
+    SetStatus(*run, lease.key, EvaluationStatus::kWaiting, 0);
   }
   SetState(
       *run, CampaignEvent::kCancel, "asked for",
@@ -533,11 +559,11 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
   const int slots = workers_.Slots();
   if (ended > 0 && slots > 0) {
     const auto open =
-        run->With(EvaluationStatus::kWaiting).size() + run->With(EvaluationStatus::kRunning).size();
+        run->Count(EvaluationStatus::kWaiting) + run->Count(EvaluationStatus::kRunning);
     live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
   }
   const auto& program = run->definition().campaign.program;
-  if (program && !run->With(EvaluationStatus::kWaiting).empty()) {
+  if (program && run->Count(EvaluationStatus::kWaiting) > 0) {
     live.nobody_may = WhyNobodyMay(*run);
   }
   return live;
@@ -658,7 +684,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   if (over) {  // with runs under way only where the plan could not be made
     Enqueue(*run);
     for (const LeaseEntry& lease : leases_.OfCampaign(campaign)) {
-      leases_.Release(lease.attempt);
+      Release(lease.attempt);
       GiveBack(lease, {}, AttemptOutcome::kCancelled, false);
       if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
         v1::ServerMessage message;
@@ -698,7 +724,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
           durations_.erase(campaign);
         }
         for (const auto& [sample, threshold] : stop_below) {
-          planned->SetStopBelow(sample, threshold);
+          planned->SetStopBelow(sample, threshold);  // Offer() follows in TakeIn()
         }
         TakeIn(campaign, resumed);
       });

@@ -18,6 +18,7 @@
 #include "server/scheduler/growth.h"
 #include "server/scheduler/leases/arrival_rate.h"
 #include "server/scheduler/leases/lease_table.h"
+#include "server/scheduler/leases/waiting_runs.h"
 #include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/plan.h"
 #include "server/scheduler/ports.h"
@@ -26,7 +27,7 @@ namespace calib::scheduler {
 
 struct SchedulerOptions {
   std::chrono::milliseconds lease{
-      15'000};  ///< an attempt is lost when nothing was heard for this long
+      15'000};  ///< an attempt is lost when nothing was heard of its worker for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers are told to speak at least this often
   int most_slots = 1024;                       ///< of one worker, >= 1
   int most_campaigns = 1000;                   ///< that are not over, >= 1
@@ -81,7 +82,8 @@ class Scheduler {
   /// Workers that were turned away by Connected() and have not come back since; the last time of
   /// each name, of the sixteen names that came last.
   std::vector<v1::RefusedWorker> Refused() const { return refused_; }
-  /// Gives up leases that have run out. Call a few times per lease.
+  /// Gives up leases that have run out. Call at least four times per lease: where one call is late
+  /// by half a lease the server has stood still, and nothing ends for a lease time from then.
   void Tick();
 
   // ---- campaigns (scheduler.cc) ----
@@ -136,12 +138,23 @@ class Scheduler {
   absl::Status Admit(const v1::Hello& hello) const;
 
   // Work (scheduler_workers.cc)
+  /// Leases what waits, the first evaluation first, each to the worker with the most free slots
+  /// that may run it; one that rests where a worker, which is there, can go on with it, waits for
+  /// that.
+  /// Not all in one turn where they are many: what workers say meanwhile is heard in between.
   void Dispatch();
-  /// The first waiting evaluation that this worker should take: not one that rests where another
-  /// worker, which is there, can go on with it, nor one that is computed for another campaign.
-  std::optional<store::EvaluationKey> NextFor(const WorkerEntry& worker,
-                                              const std::set<std::string>& under_way);
+  /// The worker that should take runs of this group now; nullptr: none.
+  const WorkerEntry* WorkerFor(const WaitingRuns::Group& group);
   void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
+  /// The worker that has spoken, or nullptr when its stream has been replaced.
+  const WorkerEntry* Heard(std::int64_t session);
+  /// Enters a lease; takes one out of all that knows of it, empty if there is none.
+  void Hold(const LeaseEntry& lease);
+  std::optional<LeaseEntry> Release(std::int64_t attempt);
+  void SetStatus(CampaignRun& run, const store::EvaluationKey& key, store::EvaluationStatus status,
+                 int failures);
+  /// Enters what waits of a sample into waiting_, or takes it out, as campaign and turn demand.
+  void Offer(CampaignRun& run, int sample);
   void SendDrain(std::int64_t session);
   void Refuse(std::int64_t session, std::int64_t attempt);
   /// The attempt is over without a result: back to the queue, or the campaign is paused when it
@@ -166,8 +179,14 @@ class Scheduler {
   // Runs that another campaign makes as well (scheduler_reuse.cc)
   /// Whether it is computed for every campaign that waits for the same.
   bool IsShared(const store::EvaluationKey& key);
-  /// Digests of the shared ones that workers compute now, or that are on their way to the disk.
-  std::set<std::string> SharedUnderWay();
+  /// What others may take of it, see LeaseEntry.
+  std::string SharedDigest(const store::EvaluationKey& key);
+  /// Whether it is computed for another campaign now: it then waits for that, off the index.
+  bool WaitsForAnother(const store::EvaluationKey& key);
+  /// An attempt more, or one less, computes what has this digest, or is on its way to the disk with
+  /// it.
+  void UnderWay(const std::string& digest);
+  void NoLongerUnderWay(const std::string& digest);
   /// The shared ones that wait in a campaign; of this digest only unless it is empty.
   std::vector<store::EvaluationKey> SharedWaiting(CampaignRun& run, const std::string& digest);
   /// Takes what waits here and has ended in another campaign from there.
@@ -208,7 +227,7 @@ class Scheduler {
   void GoOn(CampaignRun& run);
   /// What waits for a campaign to be loaded.
   void DoneLoading(std::int64_t campaign);
-  /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
+  /// Offer() of every sample.
   void Enqueue(CampaignRun& run);
   /// Why a campaign must pause that has too many diverged samples; empty: it need not. last: why
   /// the run that ended now did.
@@ -235,13 +254,17 @@ class Scheduler {
   WorkerTable workers_;
   std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
-  std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
+  WaitingRuns waiting_;                   // of leasable campaigns, each in its turn
+  std::map<std::string, int> under_way_;  // attempts by the digest that others may take from them
+  std::map<std::string, std::set<store::EvaluationKey>> parked_;  // WaitsForAnother, by digest
   std::set<std::int64_t> computing_;  // campaigns with a plan in the making
   std::set<std::int64_t> viewing_;    // and with a view in the making
   std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::pair<double, int>>
       durations_;  // seconds and number of ended attempts
+  bool dispatches_later_ = false;
+  Clock::time_point ticked_{};  // or loaded
   std::int64_t last_attempt_ = 0;
   std::int64_t last_campaign_ = 0;
   std::uint64_t version_ = 0;

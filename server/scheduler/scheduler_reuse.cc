@@ -16,22 +16,39 @@ bool Scheduler::IsShared(const EvaluationKey& key) {
   return run != nullptr && RunsToItsEnds(run->definition()) && !run->Find(key)->digest.empty();
 }
 
-std::set<std::string> Scheduler::SharedUnderWay() {
-  std::set<std::string> digests;
-  if (runs_.size() < 2) return digests;
-  for (const auto& [id, run] : runs_) {
-    for (const LeaseEntry& lease : leases_.OfCampaign(id)) {
-      if (IsShared(lease.key)) digests.insert(run->Find(lease.key)->digest);
-    }
+std::string Scheduler::SharedDigest(const EvaluationKey& key) {
+  return IsShared(key) ? FindRun(key.campaign)->Find(key)->digest : "";
+}
+
+bool Scheduler::WaitsForAnother(const EvaluationKey& key) {
+  if (runs_.size() < 2 || !IsShared(key)) return false;
+  const std::string& digest = FindRun(key.campaign)->Find(key)->digest;
+  if (under_way_.count(digest) == 0) return false;
+  waiting_.Take(key);
+  parked_[digest].insert(key);
+  return true;
+}
+
+void Scheduler::UnderWay(const std::string& digest) {
+  if (!digest.empty()) ++under_way_[digest];
+}
+
+void Scheduler::NoLongerUnderWay(const std::string& digest) {
+  const auto found = under_way_.find(digest);
+  if (found == under_way_.end() || --found->second > 0) return;
+  under_way_.erase(found);
+  const auto parked = parked_.extract(digest);
+  if (parked.empty()) return;
+  for (const EvaluationKey& key : parked.mapped()) {
+    if (CampaignRun* run = FindRun(key.campaign); run != nullptr) Offer(*run, key.sample);
   }
-  for (const auto& [attempt, digest] : ending_) digests.insert(digest);
-  return digests;
 }
 
 std::vector<EvaluationKey> Scheduler::SharedWaiting(CampaignRun& run, const std::string& digest) {
   std::vector<EvaluationKey> keys;
-  for (const EvaluationKey& key : run.With(EvaluationStatus::kWaiting)) {
-    if (IsShared(key) && (digest.empty() || digest == run.Find(key)->digest)) keys.push_back(key);
+  for (const EvaluationKey& key :
+       digest.empty() ? run.With(EvaluationStatus::kWaiting) : run.WaitingFor(digest)) {
+    if (IsShared(key)) keys.push_back(key);
   }
   return keys;
 }
@@ -46,8 +63,8 @@ void Scheduler::TakeFromOthers(CampaignRun& run, const std::string& digest) {
   for (const EvaluationKey& key : waiting) {
     const auto equal = reader->FindEqual(run.Find(key)->digest);
     if (!equal.ok() || !equal->has_value()) continue;
-    queue_.erase(key);
-    run.SetStatus(key, EvaluationStatus::kRunning, run.Find(key)->failures);  // without a lease
+    const int failures = run.Find(key)->failures;
+    SetStatus(run, key, EvaluationStatus::kRunning, failures);  // without a lease
     taken.push_back(key);
     from_to.emplace_back(**equal, key);
   }

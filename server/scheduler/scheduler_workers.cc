@@ -22,6 +22,12 @@ constexpr std::chrono::minutes kRemembered{10};
 /// Attempts that a worker may name, by slot: those leased, and those of a lease that has expired
 /// while it was frozen, twice over.
 constexpr int kAttemptsPerSlot = 4;
+/// Leases granted in one turn of the strand. Chosen: some milliseconds of it, at a tenth of one
+/// each.
+constexpr int kGrantsPerTurn = 64;
+/// Share of a lease: a server whose tick is later has stood still. Chosen: twice what is between
+/// ticks at most (Core), and the other half is time enough to be heard in.
+constexpr double kStoodStill = 0.5;
 /// Attempts that one heartbeat gets refused; the next gets the rest. Chosen: some times those of a
 /// node with many slots, and few enough that a flood of heartbeats is no flood of answers.
 constexpr int kRefusedAtOnce = 64;
@@ -69,7 +75,7 @@ absl::Status Scheduler::Admit(const v1::Hello& hello) const {
                      " offers other contacts, effects or tests than the server: update the node"));
   }
   const Clock::time_point now = ports_.Now();
-  if (workers_.IsAnother(hello, now - options_.lease)) {
+  if (workers_.IsAnother(hello, leases_.HeardSince(now))) {
     const Clock::duration silence = now - workers_.all().at(hello.name()).heard;
     return absl::AlreadyExistsError(
         absl::StrCat("a worker ", hello.name(), " is connected already and was heard ",
@@ -94,7 +100,8 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
     return admitted;
   }
   const Clock::time_point now = ports_.Now();
-  if (const std::int64_t before = workers_.Connect(hello, session, now); before != 0) {
+  if (const std::int64_t before = workers_.Connect(hello, session, leases_.Busy(hello.name()), now);
+      before != 0) {
     ports_.Close(before, absl::AbortedError("the worker has opened another stream"));
   }
   v1::ServerMessage welcome;
@@ -106,14 +113,15 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   }
 
   const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
+  leases_.Heard(hello.name(), now);
   for (const std::int64_t attempt : held) {
-    if (!leases_.Renew(attempt, hello.name(), now)) {
+    if (!leases_.Named(attempt, hello.name(), now)) {
       Refuse(session, attempt);
     }
   }
   for (const LeaseEntry& lease : leases_.OfWorker(hello.name())) {
     if (held.count(lease.attempt) == 0) {
-      leases_.Release(lease.attempt);
+      Release(lease.attempt);
       GiveBack(lease, Because(lease.attempt, "the worker came back without it"),
                AttemptOutcome::kLost, true);
     }
@@ -146,20 +154,19 @@ void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
 }
 
 void Scheduler::Reject(std::int64_t session, std::int64_t attempt, const std::string& why) {
-  WorkerEntry* worker = workers_.OfSession(session);
+  const WorkerEntry* worker = Heard(session);
   if (worker == nullptr) {
     return;
   }
-  worker->heard = ports_.Now();
   if (leases_.Find(attempt, worker->hello.name()) != nullptr) {
-    GiveBack(*leases_.Release(attempt), Because(attempt, why), AttemptOutcome::kFailed, true);
+    GiveBack(*Release(attempt), Because(attempt, why), AttemptOutcome::kFailed, true);
   }
   Refuse(session, attempt);
   Dispatch();
 }
 
 absl::Status Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
-  WorkerEntry* worker = workers_.OfSession(session);
+  const WorkerEntry* worker = workers_.OfSession(session);
   if (worker == nullptr) {
     return absl::OkStatus();
   }
@@ -167,50 +174,57 @@ absl::Status Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heart
       !status.ok()) {
     return status;
   }
+  Heard(session);
   const Clock::time_point now = ports_.Now();
-  const bool was_silent = worker->heard < now - options_.lease;
-  worker->heard = now;
   int refused = 0;
   for (const std::int64_t attempt : heartbeat.attempts()) {
-    if (!leases_.Renew(attempt, worker->hello.name(), now) && refused < kRefusedAtOnce) {
+    if (!leases_.Named(attempt, worker->hello.name(), now) && refused < kRefusedAtOnce) {
       Refuse(session, attempt);
       ++refused;
     }
   }
-  if (was_silent) {
+  const std::vector<LeaseEntry> unnamed = leases_.Unnamed(worker->hello.name(), now);
+  for (const LeaseEntry& lease : unnamed) {
+    Release(lease.attempt);
+    GiveBack(lease,
+             Because(lease.attempt, absl::StrCat("worker ", lease.worker, " has not named it for ",
+                                                 options_.lease.count(), " ms")),
+             AttemptOutcome::kLost, true);
+    Refuse(session, lease.attempt);
+  }
+  if (!unnamed.empty()) {
     Dispatch();
   }
   return absl::OkStatus();
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::Leaving& /*leaving*/) {
-  WorkerEntry* worker = workers_.OfSession(session);
+  const WorkerEntry* worker = workers_.OfSession(session);
   if (worker == nullptr) {
     return;
   }
-  worker->leaving = true;
+  workers_.Leave(session);
   for (const LeaseEntry& lease : leases_.OfWorker(worker->hello.name())) {
-    leases_.Release(lease.attempt);
+    Release(lease.attempt);
     GiveBack(lease, Because(lease.attempt, "the worker left"), AttemptOutcome::kStopped, false);
   }
   Dispatch();
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
-  WorkerEntry* worker = workers_.OfSession(session);
+  const WorkerEntry* worker = Heard(session);
   if (worker == nullptr) {
     return;
   }
-  worker->heard = ports_.Now();
-  if (!leases_.Renew(batch.attempt(), worker->hello.name(), ports_.Now())) {
+  if (!leases_.Named(batch.attempt(), worker->hello.name(), ports_.Now())) {
     Refuse(session, batch.attempt());
     return;
   }
   const EvaluationKey key = leases_.Find(batch.attempt(), worker->hello.name())->key;
   CampaignRun& run = *FindRun(key.campaign);  // leases end with their campaign
   const auto fail = [&](const std::string& why) {
-    GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), why),
-             AttemptOutcome::kFailed, true);
+    GiveBack(*Release(batch.attempt()), Because(batch.attempt(), why), AttemptOutcome::kFailed,
+             true);
     Refuse(session, batch.attempt());
   };
   if (const auto most = run.PathLength(key.experiment);
@@ -243,7 +257,7 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   Changed(key.campaign);
   arrivals_[key.campaign].Add(ports_.Now(), static_cast<std::int64_t>(records.size()));
   if (stop) {
-    StopEarly(session, *leases_.Release(batch.attempt()), std::move(records));
+    StopEarly(session, *Release(batch.attempt()), std::move(records));
     return;
   }
   v1::ServerMessage ack;
@@ -264,16 +278,15 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
-  WorkerEntry* worker = workers_.OfSession(session);
+  const WorkerEntry* worker = Heard(session);
   if (worker == nullptr) {
     return;
   }
-  worker->heard = ports_.Now();
   if (leases_.Find(finished.attempt(), worker->hello.name()) == nullptr) {
     Refuse(session, finished.attempt());
     return;
   }
-  const LeaseEntry lease = *leases_.Release(finished.attempt());
+  const LeaseEntry lease = *Release(finished.attempt());
   CampaignRun& run = *FindRun(lease.key.campaign);
   auto& [seconds, ended] = durations_[lease.key.campaign];
   seconds += std::chrono::duration<double>(ports_.Now() - lease.started).count();
@@ -299,7 +312,7 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       End(session, lease, EvaluationStatus::kDiverged, finished);
       break;
     case v1::Finished::OUTCOME_STOPPED:  // of its own accord: the node is going down
-      worker->leaving = true;
+      workers_.Leave(session);
       GiveBack(lease, finished, AttemptOutcome::kStopped, false);
       Refuse(session, finished.attempt());
       break;
@@ -322,7 +335,7 @@ void Scheduler::ModelFailed(std::int64_t session, const LeaseEntry& lease,
     Refuse(session, finished.attempt());
     return;
   }
-  run.SetStatus(lease.key, EvaluationStatus::kRunning, failures);
+  SetStatus(run, lease.key, EvaluationStatus::kRunning, failures);
   v1::Finished last = finished;
   last.set_reason(absl::StrCat("failed ", failures, failures == 1 ? " time, " : " times, ",
                                "last: ", finished.reason()));
@@ -335,13 +348,12 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   const int failures = run.Find(lease.key)->failures;
   const std::string reason =
       absl::StrCat("cannot reach a weight that counts, by load step ", records.back().load_step);
-  run.SetStatus(lease.key, EvaluationStatus::kStoppedEarly, failures);
+  SetStatus(run, lease.key, EvaluationStatus::kStoppedEarly, failures);
   // The sample's further experiments would be run in vain.
   std::map<EvaluationKey, int> spared;
   for (const EvaluationKey& beside : run.WaitingBeside(lease.key)) {
     spared[beside] = run.Find(beside)->failures;
-    run.SetStatus(beside, EvaluationStatus::kStoppedEarly, spared[beside]);
-    queue_.erase(beside);
+    SetStatus(run, beside, EvaluationStatus::kStoppedEarly, spared[beside]);
   }
   const std::string beside_reason =
       absl::StrCat("not run: the sample ", reason, " of ", NameOf(run, lease.key));
@@ -405,7 +417,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
                     const v1::Finished& finished, const std::string& held_in) {
   CampaignRun& run = *FindRun(lease.key.campaign);
   const int failures = run.Find(lease.key)->failures;
-  run.SetStatus(lease.key, status, failures);
+  SetStatus(run, lease.key, status, failures);
   Changed(lease.key.campaign);
   WorkersChanged();
   // Before an iteration is complete, and where held-out tests are run, each run counts by itself.
@@ -417,6 +429,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   const bool resting = status == EvaluationStatus::kStoppedEarly;
   const std::string digest = resting ? "" : run.Find(lease.key)->digest;
   ending_[lease.attempt] = digest;
+  UnderWay(digest);
   const store::Store::Job end =
       [key = lease.key, status, failures, diverged, unknown, resting, held_in,
        now = ports_.UnixMs(), name = NameOf(run, lease.key),
@@ -439,6 +452,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   const Reply then = [this, session, lease, states = finished.states(),
                       digest](const absl::Status& committed) {
     ending_.erase(lease.attempt);
+    NoLongerUnderWay(digest);
     if (!committed.ok()) {
       return;
     }
@@ -485,7 +499,7 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   const int counted = by_node ? evaluation.losses : failures;
   const bool too_often = counts_as_failure && counted >= campaign.failure.attempts;
   const auto status = too_often ? EvaluationStatus::kFailed : EvaluationStatus::kWaiting;
-  run->SetStatus(lease.key, status, failures);
+  SetStatus(*run, lease.key, status, failures);
   const store::Store::Job end = [key = lease.key, status, failures, now = ports_.UnixMs(),
                                  name = NameOf(*run, lease.key),
                                  end = ToRecord(finished, outcome)](Transaction& t) {
@@ -502,51 +516,93 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
     return;
   }
   Write(lease.key.campaign, end, [](const absl::Status&) {});
-  Enqueue(*run);
 }
 
 void Scheduler::Dispatch() {
-  std::set<std::string> under_way = SharedUnderWay();
-  bool granted = true;
-  while (granted && !queue_.empty()) {
-    granted = false;
-    for (const WorkerEntry* worker : workers_.Free(leases_, ports_.Now() - options_.lease)) {
-      if (const auto key = NextFor(*worker, under_way); key.has_value()) {
-        queue_.erase(*key);
-        Grant(*worker, *key);
-        if (runs_.size() > 1 && IsShared(*key)) {
-          under_way.insert(FindRun(key->campaign)->Find(*key)->digest);
-        }
-        granted = true;
-        break;
+  if (waiting_.empty() || !workers_.AnyFree()) {
+    return;
+  }
+  std::set<std::pair<EvaluationKey, WaitingRuns::Group>> firsts;
+  const auto enter = [&](const WaitingRuns::Group& group) {
+    auto key = waiting_.First(group);
+    while (key.has_value() && WaitsForAnother(*key)) {
+      key = waiting_.First(group);
+    }
+    if (key.has_value()) {
+      firsts.emplace(*key, group);
+    }
+  };
+  for (const WaitingRuns::Group& group : waiting_.Groups()) {
+    enter(group);
+  }
+  for (int granted = 0; !firsts.empty() && workers_.AnyFree();) {
+    if (granted == kGrantsPerTurn) {
+      if (!std::exchange(dispatches_later_, true)) {
+        ports_.Later([this] {
+          dispatches_later_ = false;
+          Dispatch();
+        });
       }
+      return;
+    }
+    const auto [key, group] = *firsts.begin();
+    firsts.erase(firsts.begin());
+    if (WaitsForAnother(key)) {  // since another group was leased the same
+      enter(group);
+    } else if (const WorkerEntry* worker = WorkerFor(group); worker != nullptr) {
+      Grant(*worker, key);
+      ++granted;
+      enter(group);
     }
   }
 }
 
-std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker,
-                                                const std::set<std::string>& under_way) {
-  const Clock::time_point heard_since = ports_.Now() - options_.lease;
-  for (const EvaluationKey& key : queue_) {
-    const CampaignRun::Evaluation& evaluation = *FindRun(key.campaign)->Find(key);
-    if (!FindRun(key.campaign)->MayBeRunBy(worker.hello.programs())) continue;
-    if (under_way.count(evaluation.digest) > 0 && IsShared(key)) continue;
-    if (!FindRun(key.campaign)->IsItsTurn(key)) continue;
-    const std::string& held_in = evaluation.held_in;
-    if (held_in.empty() || held_in == worker.hello.checkpoints() ||
-        !workers_.IsThere(held_in, heard_since)) {
-      return key;
-    }
+const WorkerEntry* Scheduler::WorkerFor(const WaitingRuns::Group& group) {
+  const auto& [campaign, held_in] = group;
+  const auto may = [run = FindRun(campaign)](const WorkerTable::Programs& programs) {
+    return run->MayBeRunBy(programs);
+  };
+  return held_in.empty() || !workers_.IsThere(held_in) ? workers_.Freest(may)
+                                                       : workers_.FreestAt(held_in, may);
+}
+
+void Scheduler::Hold(const LeaseEntry& lease) {
+  leases_.Grant(lease);
+  workers_.SetBusy(lease.worker, leases_.Busy(lease.worker));
+  UnderWay(lease.shared);
+}
+
+std::optional<LeaseEntry> Scheduler::Release(std::int64_t attempt) {
+  std::optional<LeaseEntry> lease = leases_.Release(attempt);
+  if (lease.has_value()) {
+    workers_.SetBusy(lease->worker, leases_.Busy(lease->worker));
+    NoLongerUnderWay(lease->shared);
   }
-  return std::nullopt;
+  return lease;
+}
+
+const WorkerEntry* Scheduler::Heard(std::int64_t session) {
+  bool was_silent = false;
+  const WorkerEntry* worker = workers_.Heard(session, ports_.Now(), &was_silent);
+  if (worker != nullptr) {
+    leases_.Heard(worker->hello.name(), ports_.Now());
+  }
+  if (was_silent) {
+    Dispatch();
+  }
+  return worker;
 }
 
 void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   CampaignRun& run = *FindRun(key.campaign);  // the queue holds live campaigns only
   const std::int64_t attempt = ++last_attempt_;
-  leases_.Grant(attempt, key, worker.hello.name(), ports_.Now());
+  Hold({.attempt = attempt,
+        .key = key,
+        .worker = worker.hello.name(),
+        .shared = SharedDigest(key),
+        .started = ports_.Now()});
   const int failures = run.Find(key)->failures;
-  run.SetStatus(key, EvaluationStatus::kRunning, failures);
+  SetStatus(run, key, EvaluationStatus::kRunning, failures);
   Changed(key.campaign);
   WorkersChanged();
   if (run.state() == CampaignState::kQueued) {
@@ -588,7 +644,11 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
 
 void Scheduler::Tick() {
   const Clock::time_point now = ports_.Now();
-  for (const LeaseEntry& lease : leases_.TakeExpired(now)) {
+  if (now - std::exchange(ticked_, now) > kStoodStill * options_.lease) {
+    leases_.Pardon(now);
+  }
+  for (const LeaseEntry& lease : leases_.Expired(now)) {
+    Release(lease.attempt);
     GiveBack(lease,
              Because(lease.attempt, absl::StrCat("nothing was heard from worker ", lease.worker,
                                                  " for ", options_.lease.count(), " ms")),
@@ -597,7 +657,7 @@ void Scheduler::Tick() {
       Refuse(worker->session, lease.attempt);
     }
   }
-  workers_.ForgetGone(now - kRemembered);
+  workers_.Review(leases_.HeardSince(now), now - kRemembered);
   for (auto& [campaign, arrivals] : arrivals_) {
     if (arrivals.HasCeased(now)) {
       Changed(campaign);
@@ -610,11 +670,11 @@ void Scheduler::Tick() {
 }
 
 absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
-  WorkerEntry* worker = workers_.Find(name);
+  const WorkerEntry* worker = workers_.Find(name);
   if (worker == nullptr) {
     return absl::NotFoundError(absl::StrCat("there is no worker ", name));
   }
-  worker->draining = true;
+  workers_.Drain(name);
   SendDrain(worker->session);
   WorkersChanged();
   for (const v1::WorkerInfo& info : Workers()) {

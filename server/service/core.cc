@@ -119,16 +119,19 @@ void Core::RemoveSession(std::int64_t session) {
   scheduler_.Disconnected(session);
 }
 
+store::Store::Done Core::OnceWritten(std::function<void(const absl::Status&)> then) {
+  // Shared, for what it holds, as an answer, would be copied on its way to the strand.
+  return
+      [this, then = std::make_shared<std::function<void(const absl::Status&)>>(std::move(then))](
+          const absl::Status& status) { Post([this, status, then] { Written(status, *then); }); };
+}
+
 void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->Write(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
-    Post([this, status, then] { Written(status, then); });
-  });
+  store_->Write(std::move(job), OnceWritten(std::move(then)));
 }
 
 void Core::WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->WriteIfRoom(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
-    Post([this, status, then] { Written(status, then); });
-  });
+  store_->WriteIfRoom(std::move(job), OnceWritten(std::move(then)));
 }
 
 void Core::Written(absl::Status status, const std::function<void(const absl::Status&)>& then) {

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "server/scheduler/ports.h"
 #include "server/scheduler/scheduler.h"
@@ -87,6 +88,7 @@ class Core final : public scheduler::Ports {
   absl::StatusOr<store::Reader> Read() override { return store_->Read(); }  // on any thread
   void Compute(std::function<std::function<void()>()> work) override;
   void Load(std::function<std::function<void()>()> work) override;
+  void Later(std::function<void()> task) override { Post(std::move(task)); }
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
   /// Stands still while the disk has no room: workers that speak are not read then, and are not
@@ -96,6 +98,8 @@ class Core final : public scheduler::Ports {
 
  private:
   void Fail(const absl::Status& status);
+  /// Has Written() called for it on the strand.
+  store::Store::Done OnceWritten(std::function<void(const absl::Status&)> then);
   /// What the store has said of a write, on the strand.
   void Written(absl::Status status, const std::function<void(const absl::Status&)>& then);
   /// On the strand: writing waits for room, or goes on.

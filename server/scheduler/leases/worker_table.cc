@@ -1,7 +1,6 @@
 #include "server/scheduler/leases/worker_table.h"
 
-#include <algorithm>
-#include <utility>
+#include <tuple>
 
 namespace calib::scheduler {
 namespace {
@@ -10,23 +9,78 @@ namespace {
 /// of those that are there is that of connections.
 constexpr std::size_t kMostRemembered = 4000;
 
-bool TakesWork(const WorkerEntry& entry, Clock::time_point heard_since) {
-  return entry.session != 0 && !entry.draining && !entry.leaving && entry.heard >= heard_since;
+bool TakesWork(const WorkerEntry& entry) {
+  return entry.session != 0 && !entry.draining && !entry.leaving && !entry.silent;
+}
+
+int FreeSlots(const WorkerEntry& entry) { return entry.hello.slots() - entry.busy; }
+
+WorkerTable::Programs ProgramsOf(const WorkerEntry& entry) {
+  return {entry.hello.programs().begin(), entry.hello.programs().end()};
 }
 
 }  // namespace
 
-std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
+bool WorkerTable::Freer::operator()(const WorkerEntry* a, const WorkerEntry* b) const {
+  return std::make_tuple(-FreeSlots(*a), std::cref(a->hello.name())) <
+         std::make_tuple(-FreeSlots(*b), std::cref(b->hello.name()));
+}
+
+void WorkerTable::Index(const WorkerEntry& entry) {
+  if (entry.session != 0) {
+    slots_ += entry.hello.slots();
+  }
+  if (!TakesWork(entry)) {
+    return;
+  }
+  Folder& folder = there_[entry.hello.checkpoints()];
+  ++folder.workers;
+  if (FreeSlots(entry) > 0) {
+    folder.free.insert(&entry);
+    free_[ProgramsOf(entry)].insert(&entry);
+  }
+}
+
+void WorkerTable::Unindex(const WorkerEntry& entry) {
+  if (entry.session != 0) {
+    slots_ -= entry.hello.slots();
+  }
+  if (!TakesWork(entry)) {
+    return;
+  }
+  const auto folder = there_.find(entry.hello.checkpoints());
+  if (FreeSlots(entry) > 0) {
+    folder->second.free.erase(&entry);
+    const auto ranking = free_.find(ProgramsOf(entry));
+    ranking->second.erase(&entry);
+    if (ranking->second.empty()) {
+      free_.erase(ranking);
+    }
+  }
+  if (--folder->second.workers == 0) {
+    there_.erase(folder);
+  }
+}
+
+std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session, int busy,
                                   Clock::time_point now) {
   WorkerEntry& entry = workers_[hello.name()];
   const std::int64_t before = entry.session;
-  entry.draining =
-      entry.draining && !entry.leaving;  // a drained worker that is started again works
-  entry.leaving = false;
-  entry.hello = hello;
-  entry.hello.clear_attempts();
-  entry.session = session;
-  entry.heard = now;
+  if (before != 0) {
+    by_session_.erase(before);
+  }
+  Change(entry, [&](WorkerEntry& worker) {
+    worker.draining =
+        worker.draining && !worker.leaving;  // a drained worker that is started again works
+    worker.leaving = false;
+    worker.silent = false;
+    worker.hello = hello;
+    worker.hello.clear_attempts();
+    worker.session = session;
+    worker.busy = busy;
+    worker.heard = now;
+  });
+  by_session_[session] = &entry;
   if (workers_.size() > kMostRemembered) {
     ForgetOldest();
   }
@@ -47,72 +101,96 @@ void WorkerTable::ForgetOldest() {
 }
 
 bool WorkerTable::IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const {
-  const auto found = workers_.find(hello.name());
-  if (found == workers_.end()) {
-    return false;
-  }
-  const WorkerEntry& entry = found->second;
-  return entry.hello.instance() != hello.instance() && entry.session != 0 && !entry.leaving &&
-         entry.heard >= heard_since;
+  const WorkerEntry* entry = Find(hello.name());
+  return entry != nullptr && entry->hello.instance() != hello.instance() && entry->session != 0 &&
+         !entry->leaving && entry->heard >= heard_since;
 }
 
 void WorkerTable::Disconnect(std::int64_t session) {
-  if (WorkerEntry* entry = OfSession(session); entry != nullptr) {
-    entry->session = 0;
+  const auto found = by_session_.find(session);
+  if (found == by_session_.end()) {
+    return;
+  }
+  Change(*found->second, [](WorkerEntry& worker) { worker.session = 0; });
+  by_session_.erase(found);
+}
+
+void WorkerTable::SetBusy(const std::string& name, int leases) {
+  if (const auto found = workers_.find(name); found != workers_.end()) {
+    Change(found->second, [leases](WorkerEntry& worker) { worker.busy = leases; });
   }
 }
 
-WorkerEntry* WorkerTable::Find(const std::string& name) {
+void WorkerTable::Drain(const std::string& name) {
+  if (const auto found = workers_.find(name); found != workers_.end()) {
+    Change(found->second, [](WorkerEntry& worker) { worker.draining = true; });
+  }
+}
+
+void WorkerTable::Leave(std::int64_t session) {
+  if (const auto found = by_session_.find(session); found != by_session_.end()) {
+    Change(*found->second, [](WorkerEntry& worker) { worker.leaving = true; });
+  }
+}
+
+const WorkerEntry* WorkerTable::Heard(std::int64_t session, Clock::time_point now,
+                                      bool* was_silent) {
+  const auto found = by_session_.find(session);
+  if (found == by_session_.end()) {
+    return nullptr;
+  }
+  WorkerEntry& entry = *found->second;
+  entry.heard = now;
+  if (entry.silent) {
+    *was_silent = true;
+    Change(entry, [](WorkerEntry& worker) { worker.silent = false; });
+  }
+  return &entry;
+}
+
+void WorkerTable::Review(Clock::time_point heard_since, Clock::time_point remembered_since) {
+  std::erase_if(workers_, [remembered_since](const auto& item) {  // these are in no index
+    return item.second.session == 0 && item.second.heard < remembered_since;
+  });
+  for (auto& [name, entry] : workers_) {
+    if (!entry.silent && entry.heard < heard_since) {
+      Change(entry, [](WorkerEntry& worker) { worker.silent = true; });
+    }
+  }
+}
+
+const WorkerEntry* WorkerTable::Find(const std::string& name) const {
   const auto found = workers_.find(name);
   return found == workers_.end() ? nullptr : &found->second;
 }
 
-WorkerEntry* WorkerTable::OfSession(std::int64_t session) {
-  for (auto& [name, entry] : workers_) {
-    if (entry.session == session) {
-      return &entry;
+const WorkerEntry* WorkerTable::OfSession(std::int64_t session) const {
+  const auto found = by_session_.find(session);
+  return found == by_session_.end() ? nullptr : found->second;
+}
+
+const WorkerEntry* WorkerTable::Freest(const May& may) const {
+  const WorkerEntry* freest = nullptr;
+  for (const auto& [programs, ranking] : free_) {
+    const WorkerEntry* first = *ranking.begin();
+    if ((freest == nullptr || Freer()(first, freest)) && may(programs)) {
+      freest = first;
+    }
+  }
+  return freest;
+}
+
+const WorkerEntry* WorkerTable::FreestAt(const std::string& checkpoints, const May& may) const {
+  const auto folder = there_.find(checkpoints);
+  if (folder == there_.end()) {
+    return nullptr;
+  }
+  for (const WorkerEntry* worker : folder->second.free) {
+    if (may(ProgramsOf(*worker))) {
+      return worker;
     }
   }
   return nullptr;
-}
-
-void WorkerTable::ForgetGone(Clock::time_point heard_since) {
-  std::erase_if(workers_, [heard_since](const auto& item) {
-    return item.second.session == 0 && item.second.heard < heard_since;
-  });
-}
-
-std::vector<const WorkerEntry*> WorkerTable::Free(const LeaseTable& leases,
-                                                  Clock::time_point heard_since) const {
-  std::vector<std::pair<int, const WorkerEntry*>> free;
-  for (const auto& [name, entry] : workers_) {
-    const int slots = entry.hello.slots() - leases.Busy(name);
-    if (TakesWork(entry, heard_since) && slots > 0) {
-      free.emplace_back(slots, &entry);
-    }
-  }
-  std::stable_sort(free.begin(), free.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<const WorkerEntry*> workers;
-  workers.reserve(free.size());
-  for (const auto& [slots, entry] : free) {
-    workers.push_back(entry);
-  }
-  return workers;
-}
-
-bool WorkerTable::IsThere(const std::string& checkpoints, Clock::time_point heard_since) const {
-  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& item) {
-    return TakesWork(item.second, heard_since) && item.second.hello.checkpoints() == checkpoints;
-  });
-}
-
-int WorkerTable::Slots() const {
-  int slots = 0;
-  for (const auto& [name, entry] : workers_) {
-    slots += entry.session != 0 ? entry.hello.slots() : 0;
-  }
-  return slots;
 }
 
 }  // namespace calib::scheduler

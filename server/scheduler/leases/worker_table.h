@@ -1,9 +1,11 @@
 #pragma once
 // The workers known since the server started: who is connected, over which stream, with how many
-// slots.
+// slots, and which of them takes the next run.
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,40 +17,85 @@ namespace calib::scheduler {
 struct WorkerEntry {
   v1::Hello hello{};         ///< without the attempts that it named
   std::int64_t session = 0;  ///< of its stream; 0: not connected
+  int busy = 0;              ///< slots with a lease
   bool draining = false;     ///< takes nothing new, by a user's wish
   bool leaving = false;      ///< takes nothing new, by its own; until it comes back
+  bool silent = false;       ///< takes nothing new until it is heard
   Clock::time_point heard{};
 };
 
-/// Not thread-safe.
+/// Indexed by name, by stream, and by free slots: a call takes O(log n) unless it says more. Not
+/// thread-safe.
 class WorkerTable {
  public:
-  /// Enters a worker with its new stream; returns the session of the stream it had before, or 0. Of
-  /// very many workers the one that is gone and was heard least lately is forgotten.
-  std::int64_t Connect(const v1::Hello& hello, std::int64_t session, Clock::time_point now);
+  /// Programs that a worker may run (Hello::programs).
+  using Programs = std::vector<std::string>;
+  using May = std::function<bool(const Programs&)>;
+
+  WorkerTable() = default;
+  WorkerTable(const WorkerTable&) = delete;  // the indices point into it
+  WorkerTable& operator=(const WorkerTable&) = delete;
+
+  /// Enters a worker with its new stream and this many leases; returns the session of the stream it
+  /// had before, or 0. Of very many workers the one that is gone and was heard least lately is
+  /// forgotten.
+  std::int64_t Connect(const v1::Hello& hello, std::int64_t session, int busy,
+                       Clock::time_point now);
   /// Whether another process is connected under this name, was heard since then and has not said
   /// that it leaves.
   bool IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const;
   void Disconnect(std::int64_t session);
-  /// Forgets those that are gone and were not heard since then.
-  void ForgetGone(Clock::time_point heard_since);
+  /// Its leases are so many now. Without effect on one that is not known, as below.
+  void SetBusy(const std::string& name, int leases);
+  void Drain(const std::string& name);
+  void Leave(std::int64_t session);
+  /// The worker that has spoken over this stream, or nullptr when that has been replaced.
+  /// was_silent is set where it took nothing for its silence, and is left alone otherwise.
+  const WorkerEntry* Heard(std::int64_t session, Clock::time_point now, bool* was_silent);
+  /// Those that were not heard since then are silent (a frozen machine keeps its connection);
+  /// those that are gone and were not heard since `remembered_since` are forgotten. O(n).
+  void Review(Clock::time_point heard_since, Clock::time_point remembered_since);
 
-  WorkerEntry* Find(const std::string& name);
+  const WorkerEntry* Find(const std::string& name) const;
   /// By its stream, or nullptr when that has been replaced.
-  WorkerEntry* OfSession(std::int64_t session);
-  /// Workers with free slots, the most first (ties: by name), among those that are connected, not
-  /// draining and were heard since `heard_since` (a frozen machine keeps its connection).
-  std::vector<const WorkerEntry*> Free(const LeaseTable& leases,
-                                       Clock::time_point heard_since) const;
-  /// Whether a worker with this checkpoint folder is there and takes work, be it busy now.
-  bool IsThere(const std::string& checkpoints, Clock::time_point heard_since) const;
+  const WorkerEntry* OfSession(std::int64_t session) const;
+  /// Whether any worker has a free slot and takes work.
+  bool AnyFree() const { return !free_.empty(); }
+  /// The worker with the most free slots (ties: by name) among those that take work and whose
+  /// programs are such; nullptr: none. O(n) in the lists of programs that differ.
+  const WorkerEntry* Freest(const May& may) const;
+  /// The same among those with this checkpoint folder. O(n) in these.
+  const WorkerEntry* FreestAt(const std::string& checkpoints, const May& may) const;
+  /// Whether a worker with this checkpoint folder takes work, be it busy now.
+  bool IsThere(const std::string& checkpoints) const { return there_.count(checkpoints) > 0; }
   const std::map<std::string, WorkerEntry>& all() const { return workers_; }
-  int Slots() const;  ///< of all that are connected
+  int Slots() const { return slots_; }  ///< of all that are connected
 
  private:
+  struct Freer {
+    bool operator()(const WorkerEntry* a, const WorkerEntry* b) const;
+  };
+  using Ranking = std::set<const WorkerEntry*, Freer>;
+  struct Folder {
+    int workers = 0;  ///< that take work
+    Ranking free{};
+  };
+  void Index(const WorkerEntry& entry);
+  void Unindex(const WorkerEntry& entry);
+  /// Whatever an index is made of changes here only.
+  template <typename F>
+  void Change(WorkerEntry& entry, F change) {
+    Unindex(entry);
+    change(entry);
+    Index(entry);
+  }
   void ForgetOldest();
 
   std::map<std::string, WorkerEntry> workers_;
+  std::map<std::int64_t, WorkerEntry*> by_session_;
+  std::map<Programs, Ranking> free_;     // with free slots; no ranking is empty
+  std::map<std::string, Folder> there_;  // by checkpoint folder; in each at least one takes work
+  int slots_ = 0;
 };
 
 }  // namespace calib::scheduler

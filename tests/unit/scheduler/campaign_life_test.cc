@@ -48,6 +48,66 @@ TEST(CampaignLife, SilentWorkersAttemptGoesToAnotherAndItsLateWordsAreRefused) {
   EXPECT_TRUE(service.Read().States(1)->empty());
 }
 
+TEST(CampaignLife, ALargeNodeIsFilledInSeveralTurns) {
+  constexpr int kSlots = 200;
+  SimulatedService service("large_node");
+  service.Submit(testing::MakeSmallCampaign({.samples = kSlots, .max_iterations = 2}));
+  v1::Hello hello = testing::MatchingHello("large", kSlots);
+  ASSERT_TRUE(service.scheduler().Connected(1, hello).ok());
+  EXPECT_LT(service.scheduler().Workers().front().busy(), kSlots) << "others are heard in between";
+  service.ports().Run();
+  EXPECT_EQ(service.scheduler().Workers().front().busy(), kSlots);
+}
+
+TEST(CampaignLife, AnyWordOfAWorkerKeepsAllThatItWorksOn) {
+  SimulatedService service("any_word");
+  service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 2);
+  const v1::Lease quick = service.Next(worker, Kind::kLease).lease();
+  const v1::Lease slow = service.Next(worker, Kind::kLease).lease();
+  for (int step = 0; step < 3; ++step) {  // no heartbeat comes through
+    service.Advance(milliseconds(900));
+    service.SendStates(worker, quick, step, 1);
+  }
+  service.SendStates(worker, slow, 0, 1);
+  for (int ack = 0; ack < 4; ++ack) {
+    EXPECT_FALSE(service.Next(worker, Kind::kAck).ack().refused());
+  }
+  EXPECT_EQ(service.Read().States(1)->size(), 4U);
+}
+
+TEST(CampaignLife, WhatAWorkerDoesNotNameForALeaseTimeGoesToAnother) {
+  SimulatedService service("unnamed");
+  service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 2);
+  const v1::Lease known = service.Next(worker, Kind::kLease).lease();
+  const v1::Lease unknown = service.Next(worker, Kind::kLease).lease();
+  v1::Heartbeat heartbeat;
+  heartbeat.add_attempts(known.attempt());
+  for (int beat = 0; beat < 3; ++beat) {
+    service.Advance(milliseconds(500));
+    EXPECT_TRUE(service.scheduler().Receive(worker, heartbeat).ok());
+    service.ports().Run();
+  }
+  const v1::Lease again = service.Next(worker, Kind::kLease).lease();
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(again.spec(), unknown.spec()));
+  service.SendStates(worker, known, 0, 1);
+  EXPECT_FALSE(service.Next(worker, Kind::kAck).ack().refused());
+}
+
+TEST(CampaignLife, AServerThatStoodStillLosesNoLease) {
+  SimulatedService service("stood_still");
+  service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 1);
+  const v1::Lease lease = service.Next(worker, Kind::kLease).lease();
+  service.StandStill(std::chrono::seconds(20));
+  service.Advance(milliseconds(900));
+  service.SendStates(worker, lease, 0, 4);
+  EXPECT_EQ(service.Next(worker, Kind::kAck).ack().up_to(), 4);
+  service.Advance(milliseconds(2000));  // the worker is silent now
+  EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().refused());
+}
+
 TEST(CampaignLife, WorkerKeepsItsAttemptAcrossARestartOfTheServer) {
   SimulatedService service("readopt");
   service.Submit(Small());

@@ -197,6 +197,13 @@ void SimulatedService::SendEnd(std::int64_t session, std::int64_t attempt,
 }
 
 void SimulatedService::Advance(std::chrono::milliseconds time) {
+  constexpr std::chrono::milliseconds kTick = kOptions.lease / 4;  // as Core
+  for (auto left = time; left.count() > 0; left -= kTick) {
+    StandStill(std::min(left, kTick));
+  }
+}
+
+void SimulatedService::StandStill(std::chrono::milliseconds time) {
   ports_->now += time;
   scheduler_->Tick();
   ports_->Run();

@@ -39,6 +39,7 @@ class SimulatedPorts final : public Ports {
   absl::StatusOr<store::Reader> Read() override;
   void Compute(std::function<std::function<void()>()> work) override;
   void Load(std::function<std::function<void()>()> work) override { Compute(std::move(work)); }
+  void Later(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
   std::chrono::steady_clock::time_point Now() override { return now; }
@@ -78,6 +79,8 @@ class SimulatedService {
   void SendEnd(std::int64_t session, std::int64_t attempt, v1::Finished::Outcome outcome,
                const std::string& reason = "");
   void Advance(std::chrono::milliseconds time);
+  /// Time goes by without a tick of the server's.
+  void StandStill(std::chrono::milliseconds time);
   /// Lets workers run, die, fall silent and come back at random until the campaign is over; the
   /// server is restarted now and then. calm: nothing goes wrong, one worker.
   void RunToEnd(unsigned seed, bool calm);
