@@ -197,9 +197,13 @@ class Worker::Impl {
         Drop(message.stop().attempt());
         break;
       case v1::ServerMessage::kDrain:
-        spdlog::info("draining running={}", held_.size());
-        draining_ = true;
-        LeaveIfDrained();
+        if (message.drain().within_ms() > 0) {
+          DrainWithin(std::chrono::milliseconds(message.drain().within_ms()));
+        } else {
+          spdlog::info("draining running={}", held_.size());
+          draining_ = true;
+          LeaveIfDrained();
+        }
         break;
       case v1::ServerMessage::MESSAGE_NOT_SET:
         break;
@@ -380,7 +384,7 @@ class Worker::Impl {
         return;
       }
       if (options_.drain_within.count() > 0 && !std::exchange(told_to_leave_, true)) {
-        DrainWithin();
+        DrainWithin(options_.drain_within);
         WaitForSignal();
       } else {
         Stop();
@@ -388,17 +392,20 @@ class Worker::Impl {
     });
   }
 
-  /// First signal, where runs may end: nothing new is begun, what has not begun is given back (the
-  /// server then leases nothing more), what still runs at the end of the time is stopped.
-  void DrainWithin() {
-    spdlog::info("draining running={} within_s={}", held_.size(), options_.drain_within.count());
+  /// Nothing new is begun, what has not begun is given back (the server then leases nothing more),
+  /// what still runs at the end of the time is stopped.
+  void DrainWithin(std::chrono::milliseconds within) {
+    if (stopping_ || leaving_) {
+      return;
+    }
+    spdlog::info("draining running={} within_ms={}", held_.size(), within.count());
     draining_ = true;
     for (auto& [id, attempt] : held_) {
       if (!attempt.started() && !attempt.ended()) {
         EndWithout(attempt, id, v1::Finished::OUTCOME_STOPPED, kLeaving);
       }
     }
-    farewell_.expires_after(options_.drain_within);
+    farewell_.expires_after(within);
     farewell_.async_wait([this](const boost::system::error_code& error) {
       if (!error && !stopping_) {
         Stop();

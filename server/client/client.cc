@@ -366,10 +366,12 @@ absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
   return std::vector<v1::WorkerInfo>(reply.workers().begin(), reply.workers().end());
 }
 
-absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
+absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker,
+                                                   std::chrono::milliseconds within) {
   v1::DrainRequest request;
   request.set_worker(worker);
   request.set_request_id(rpc::RandomId());
+  request.set_within_ms(static_cast<int>(within.count()));
   return Call<v1::WorkerInfo>(impl_->connection, &Stub::DrainWorker, request);
 }
 

@@ -75,7 +75,9 @@ class Client {
   absl::StatusOr<v1::CampaignStatus> Cancel(const std::string& campaign);
   absl::Status Delete(const std::string& campaign);
   absl::StatusOr<std::vector<v1::WorkerInfo>> ListWorkers();
-  absl::StatusOr<v1::WorkerInfo> DrainWorker(const std::string& worker);
+  /// within: at most a day; runs that have not ended by then go on elsewhere. 0: they end.
+  absl::StatusOr<v1::WorkerInfo> DrainWorker(const std::string& worker,
+                                             std::chrono::milliseconds within = {});
   absl::StatusOr<v1::ServerReport> Examine();
 
  private:

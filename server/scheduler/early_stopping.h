@@ -69,8 +69,8 @@ std::vector<int> ToAudit(const Definition& definition, const History& history, c
 
 /// What the samples set aside as unknown (History::unknown) could hold, relative to the finished
 /// mass: each as likely as the best sample that finished, or as its states so far allow, whichever
-/// is less. No bound where one of them would fit better than all that finished. NaN where that cannot be told: no sample has a weight, or errors are found by
-/// ess_target.
+/// is less. No bound where one of them would fit better than all that finished. NaN where that
+/// cannot be told: no sample has a weight, or errors are found by ess_target.
 absl::StatusOr<double> UnknownMass(const Definition& definition, const History& history);
 
 struct Audit {

@@ -77,7 +77,7 @@ class Scheduler {
   /// A message about an attempt broke a rule: the attempt has failed for this reason.
   void Reject(std::int64_t session, std::int64_t attempt, const std::string& why);
   /// NOT_FOUND: no such worker.
-  absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
+  absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker, std::chrono::milliseconds within);
   std::vector<v1::WorkerInfo> Workers() const;
   /// Workers that were turned away by Connected() and have not come back since; the last time of
   /// each name, of the sixteen names that came last.
@@ -155,7 +155,7 @@ class Scheduler {
                  int failures);
   /// Enters what waits of a sample into waiting_, or takes it out, as campaign and turn demand.
   void Offer(CampaignRun& run, int sample);
-  void SendDrain(std::int64_t session);
+  void SendDrain(const WorkerEntry& worker);
   void Refuse(std::int64_t session, std::int64_t attempt);
   /// The attempt is over without a result: back to the queue, or the campaign is paused when it
   /// failed too often.

@@ -109,7 +109,7 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
   ports_.Send(session, std::move(welcome));
   if (workers_.Find(hello.name())->draining) {  // it may have missed the message
-    SendDrain(session);
+    SendDrain(*workers_.Find(hello.name()));
   }
 
   const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
@@ -137,10 +137,16 @@ void Scheduler::Disconnected(std::int64_t session) {
   WorkersChanged();
 }
 
-void Scheduler::SendDrain(std::int64_t session) {
+void Scheduler::SendDrain(const WorkerEntry& worker) {
   v1::ServerMessage message;
   message.mutable_drain();
-  ports_.Send(session, std::move(message));
+  if (worker.drained_by.has_value()) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(*worker.drained_by - ports_.Now());
+    message.mutable_drain()->set_within_ms(
+        static_cast<int>(std::max<std::int64_t>(1, left.count())));
+  }
+  ports_.Send(worker.session, std::move(message));
 }
 
 void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
@@ -669,13 +675,14 @@ void Scheduler::Tick() {
   Dispatch();
 }
 
-absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
+absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name,
+                                                std::chrono::milliseconds within) {
   const WorkerEntry* worker = workers_.Find(name);
   if (worker == nullptr) {
     return absl::NotFoundError(absl::StrCat("there is no worker ", name));
   }
-  workers_.Drain(name);
-  SendDrain(worker->session);
+  workers_.Drain(name, within.count() > 0 ? std::optional(ports_.Now() + within) : std::nullopt);
+  SendDrain(*worker);
   WorkersChanged();
   for (const v1::WorkerInfo& info : Workers()) {
     if (info.name() == name) {

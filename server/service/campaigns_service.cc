@@ -246,7 +246,8 @@ grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
   return Enter(context, Right::kOperate, *request,
                [this, request, reply](Unary* reactor, const Caller& caller) {
                  core_.Post([this, request, reply, reactor, caller] {
-                   auto worker = core_.scheduler().Drain(request->worker());
+                   auto worker = core_.scheduler().Drain(
+                       request->worker(), std::chrono::milliseconds(request->within_ms()));
                    if (worker.ok()) {
                      LogChange("drain", request->worker(), caller);
                    }

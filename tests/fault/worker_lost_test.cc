@@ -218,6 +218,36 @@ TEST(WorkerLost, ItsEnginesKilledBesideAnothersCampaign) {
   EXPECT_TRUE(workers->workers_size() == 1 && workers->workers(0).connected());
 }
 
+// Those told to leave leave checkpoints, from which others go on: to the same bits.
+TEST(WorkerLost, ToldToLeaveTheyLeaveCheckpoints) {
+  Deployment deployment({.name = "leaving"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Submit(deployment);
+  Client client = deployment.client();
+  std::mt19937 random(20261201);
+  std::uniform_int_distribution<int> moment(20, 150);
+  for (int i = 0; i < 8; ++i) {
+    deployment.StartWorker(2);
+    Process& worker = deployment.workers().back();
+    const std::string name = "w" + std::to_string(i + 1);
+    ASSERT_TRUE(Eventually(kLong, [&] {
+      const auto workers = client.Workers();
+      return workers.ok() && std::any_of(workers->workers().begin(), workers->workers().end(),
+                                         [&](const auto& w) { return w.name() == name; });
+    })) << deployment.Logs();
+    std::this_thread::sleep_for(std::chrono::milliseconds(moment(random)));
+    if (i % 2 == 0) {
+      worker.Signal(SIGTERM);
+    } else {
+      ASSERT_TRUE(client.Drain(name, std::chrono::milliseconds(1)).ok());
+    }
+    EXPECT_EQ(worker.Wait(kLong), 0) << deployment.Logs();
+  }
+  deployment.StartWorker(2);
+  ASSERT_TRUE(WaitFinished(deployment)) << deployment.Logs();
+  ExpectUndisturbed(deployment);
+}
+
 /// So little may be lost that every sample goes on from its rungs: the result is that of runs which
 /// go to their ends at once.
 SmallCampaign BreadthFirst(const std::string& rungs) {

@@ -155,9 +155,11 @@ absl::StatusOr<v1::WorkerList> Client::Workers() {
   return impl_->Call(&v1::Campaigns::Stub::ListWorkers, v1::ListWorkersRequest());
 }
 
-absl::StatusOr<v1::WorkerInfo> Client::Drain(const std::string& worker) {
+absl::StatusOr<v1::WorkerInfo> Client::Drain(const std::string& worker,
+                                             std::chrono::milliseconds within) {
   v1::DrainRequest request;
   request.set_worker(worker);
+  request.set_within_ms(static_cast<int>(within.count()));
   return impl_->Call(&v1::Campaigns::Stub::DrainWorker, request);
 }
 

@@ -38,7 +38,8 @@ class Client {
   absl::StatusOr<std::vector<v1::SampleStates>> States(const std::string& campaign);
   absl::StatusOr<std::vector<v1::LogEntry>> Log(const std::string& campaign);
   absl::StatusOr<v1::WorkerList> Workers();
-  absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
+  absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker,
+                                       std::chrono::milliseconds within = {});
   absl::StatusOr<v1::ServerReport> Examine();
   absl::StatusOr<v1::CampaignStatus> Pause(const v1::ControlRequest& request);
   absl::StatusOr<v1::CampaignStatus> Resume(const v1::ControlRequest& request);

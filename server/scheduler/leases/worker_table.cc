@@ -121,9 +121,12 @@ void WorkerTable::SetBusy(const std::string& name, int leases) {
   }
 }
 
-void WorkerTable::Drain(const std::string& name) {
+void WorkerTable::Drain(const std::string& name, std::optional<Clock::time_point> by) {
   if (const auto found = workers_.find(name); found != workers_.end()) {
-    Change(found->second, [](WorkerEntry& worker) { worker.draining = true; });
+    Change(found->second, [by](WorkerEntry& worker) {
+      worker.draining = true;
+      worker.drained_by = by;
+    });
   }
 }
 

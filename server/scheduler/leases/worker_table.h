@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,12 +16,13 @@
 namespace calib::scheduler {
 
 struct WorkerEntry {
-  v1::Hello hello{};         ///< without the attempts that it named
-  std::int64_t session = 0;  ///< of its stream; 0: not connected
-  int busy = 0;              ///< slots with a lease
-  bool draining = false;     ///< takes nothing new, by a user's wish
-  bool leaving = false;      ///< takes nothing new, by its own; until it comes back
-  bool silent = false;       ///< takes nothing new until it is heard
+  v1::Hello hello{};                              ///< without the attempts that it named
+  std::int64_t session = 0;                       ///< of its stream; 0: not connected
+  int busy = 0;                                   ///< slots with a lease
+  bool draining = false;                          ///< takes nothing new, by a user's wish
+  std::optional<Clock::time_point> drained_by{};  ///< and leaves what then runs; empty: it ends
+  bool leaving = false;  ///< takes nothing new, by its own; until it comes back
+  bool silent = false;   ///< takes nothing new until it is heard
   Clock::time_point heard{};
 };
 
@@ -47,7 +49,8 @@ class WorkerTable {
   void Disconnect(std::int64_t session);
   /// Its leases are so many now. Without effect on one that is not known, as below.
   void SetBusy(const std::string& name, int leases);
-  void Drain(const std::string& name);
+  /// by: when it leaves what it still runs; empty: that ends first.
+  void Drain(const std::string& name, std::optional<Clock::time_point> by = {});
   void Leave(std::int64_t session);
   /// The worker that has spoken over this stream, or nullptr when that has been replaced.
   /// was_silent is set where it took nothing for its silence, and is left alone otherwise.
