@@ -1,23 +1,29 @@
 // calibd: the service.
+#include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <condition_variable>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
+#include <mutex>
+#include <thread>
 
 #include "proto/rpc/access.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/service_manager.h"
 #include "server/page/page.h"
+#include "server/restore.h"
 #include "server/service/server.h"
 
 namespace {
 
 constexpr std::chrono::seconds kShutdown{5};
+constexpr std::chrono::seconds kLongestEnd{9};
 constexpr const char* kOwnSocket = "unix:";
 
 /// Options for how much the server takes.
@@ -42,6 +48,63 @@ void AddLimits(CLI::App& app, calib::service::Limits& limits) {
   add("--max-covariance", limits.covariance, "readings of one covariance matrix");
   add("--max-packings", limits.packings, "packings of one campaign");
   add("--max-grains", limits.grains, "grains in the packing files of one campaign");
+}
+
+/// Options for the log.
+void AddLog(CLI::App& app, calib::service::ServerOptions& options) {
+  const auto group = [](CLI::Option* option) { option->group("What it logs"); };
+  group(app.add_option("--log-file,--log", options.log_file, "FILE of the log [standard error]"));
+  group(app.add_option_function<std::string>(
+               "--log-format",
+               [&options](const std::string& form) { options.log.json = form == "json"; },
+               "text, or json: one object a line [text]")
+            ->check([](const std::string& form) {
+              return form == "text" || form == "json" ? "" : "lines of a log are text or json";
+            }));
+  group(
+      app.add_option("--log-mib", options.log.file_mib,
+                     "FILE is begun anew before it is larger; those before stay as FILE.1, FILE.2, "
+                     "the number before its ending; 0: never")
+          ->check(CLI::Range(0, 1'000'000))
+          ->capture_default_str());
+  group(app.add_option("--log-files", options.log.files, "of these that stay")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str());
+}
+
+/// Ends the process where an orderly end takes longer than whoever stops it waits: a computation
+/// that cannot be left, a peer that neither reads nor goes. Nothing that was acknowledged is lost.
+class LastResort {
+ public:
+  LastResort()
+      : thread_([](const std::stop_token& stop) {
+          std::mutex mutex;
+          std::unique_lock lock(mutex);
+          std::condition_variable_any never;
+          if (never.wait_for(lock, stop, kLongestEnd, [] { return false; }) ||
+              stop.stop_requested()) {
+            return;
+          }
+          spdlog::warn("ended_at_once reason=\"an orderly end has taken {} s\"",
+                       kLongestEnd.count());
+          spdlog::shutdown();
+          _exit(0);
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
+/// Makes a state folder of a backup; the exit code.
+int Restore(const std::string& backup, const std::string& state) {
+  const auto campaigns = calib::Restore(backup, state);
+  if (!campaigns.ok()) {
+    std::cerr << "calibd: " << campaigns.status().message() << '\n';
+    return 1;
+  }
+  std::cerr << state << " holds what " << backup << " was taken of: " << *campaigns
+            << (*campaigns == 1 ? " campaign\n" : " campaigns\n");
+  return 0;
 }
 
 /// The live page over a server that serves. A page that cannot be is warned of: what is computed
@@ -110,7 +173,11 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(10, 3'600'000))
       ->capture_default_str();
   AddLimits(app, options.limits);
-  app.add_option("--log", options.log_file, "log file [standard error]");
+  AddLog(app, options);
+  std::string backup;
+  app.add_option("--restore", backup,
+                 "FILE of `calibctl backup`: makes the state folder of it, which must be new or "
+                 "empty, and ends; with --listen or --http it serves then");
   app.add_option(
          "--exit-with-parent", parent,
          "end when the parent process, of this id, ends; who shares the folder then goes on "
@@ -146,6 +213,11 @@ int main(int argc, char** argv) {
     failed = true;
     kill(getpid(), SIGTERM);
   };
+  if (!backup.empty()) {
+    const int restored = Restore(backup, options.state_dir);
+    const bool serves = app.count("--listen") > 0 || app.count("--http") > 0;
+    if (restored != 0 || !serves) return restored;
+  }
   auto server = calib::service::Server::Start(options);
   if (!server.ok()) {
     std::cerr << "calibd: " << server.status().message() << '\n';
@@ -156,6 +228,7 @@ int main(int argc, char** argv) {
   int signal = 0;
   sigwait(&signals, &signal);
   calib::rpc::TellServiceManager(calib::rpc::kStopping);
+  const LastResort last_resort;
   page.reset();
   (*server)->Shutdown(kShutdown);
   return failed ? 1 : 0;

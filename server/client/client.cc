@@ -3,6 +3,7 @@
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -25,10 +26,12 @@ namespace {
 
 constexpr std::chrono::milliseconds kConnect{1800};
 constexpr std::chrono::minutes kLongestStream{10};
+constexpr std::chrono::hours kLongestBackup{24};
 
 /// A server that is slow to answer (a disk that stalls, a machine that sleeps) or is started again
 /// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
 /// made twice: those that change something carry a request_id, a digest or the number of a batch.
+constexpr int kCampaignsOfAPage = 500;  // some 200 KB
 constexpr int kLateAnswers = 10;
 constexpr int kLostConnections = 2;
 constexpr std::chrono::minutes kReturn{1};       // of a server that was lost
@@ -248,10 +251,25 @@ absl::StatusOr<v1::CampaignStatus> Client::AddRuns(const v1::AddRunsRequest& req
   return Call<v1::CampaignStatus>(impl_->connection, &Stub::AddRuns, request);
 }
 
-absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List() {
-  ASSIGN_OR_RETURN(const auto reply,
-                   Call<v1::ListReply>(impl_->connection, &Stub::List, v1::ListRequest()));
-  return std::vector<v1::CampaignStatus>(reply.campaigns().begin(), reply.campaigns().end());
+absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List(const Part& part) {
+  v1::ListRequest request;
+  request.set_after(part.after);
+  request.set_parent(part.parent);
+  std::vector<v1::CampaignStatus> campaigns;
+  while (true) {  // no message holds them all
+    const int wanted =
+        part.limit ? *part.limit - static_cast<int>(campaigns.size()) : kCampaignsOfAPage;
+    request.set_limit(std::clamp(wanted, 1, kCampaignsOfAPage));
+    ASSIGN_OR_RETURN(const auto reply,
+                     Call<v1::ListReply>(impl_->connection, &Stub::List, request));
+    campaigns.insert(campaigns.end(), reply.campaigns().begin(), reply.campaigns().end());
+    if (part.limit && campaigns.size() >= static_cast<std::size_t>(*part.limit)) {
+      campaigns.resize(static_cast<std::size_t>(*part.limit));
+      return campaigns;
+    }
+    if (reply.campaigns_size() < request.limit()) return campaigns;
+    request.set_after(campaigns.back().campaign());
+  }
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Show(const std::string& campaign) {
@@ -377,6 +395,46 @@ absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker,
 
 absl::StatusOr<v1::ServerReport> Client::Examine() {
   return Call<v1::ServerReport>(impl_->connection, &Stub::Examine, v1::ExamineRequest());
+}
+
+absl::StatusOr<messages::BackupSeal> Client::Backup(const BackupSink& sink) {
+  messages::BackupSeal seal;
+  absl::Status failed;  // here, not on the way
+  const auto answered =
+      Insist(impl_->connection, kLongestBackup, [&](Stub& stub, grpc::ClientContext& context) {
+        rpc::Sha256 digest;
+        seal = {};
+        failed = sink.begin();
+        if (!failed.ok()) return grpc::Status::OK;
+        const auto reader = stub.Backup(&context, v1::BackupRequest());
+        v1::BlobChunk chunk;
+        while (failed.ok() && reader->Read(&chunk)) {
+          failed = Checked(chunk);
+          if (seal.bytes == 0) seal.digest = chunk.digest();
+          seal.bytes += static_cast<std::int64_t>(chunk.data().size());
+          digest.Update(chunk.data());
+          if (failed.ok()) failed = sink.add(chunk.data());
+        }
+        if (!failed.ok()) context.TryCancel();
+        const grpc::Status status = reader->Finish();
+        if (failed.ok() && status.ok() && digest.Finish() != seal.digest) {
+          failed = absl::DataLossError("the backup has changed on its way: take it again");
+        }
+        return failed.ok() ? status : grpc::Status::OK;
+      });
+  RETURN_IF_ERROR(failed);
+  RETURN_IF_ERROR(answered);
+  return seal;
+}
+
+absl::StatusOr<v1::PruneReply> Client::Prune(std::optional<int> keep_states) {
+  v1::PruneRequest request;
+  if (keep_states) request.set_keep_states(*keep_states);
+  return Call<v1::PruneReply>(impl_->connection, &Stub::Prune, request);
+}
+
+absl::StatusOr<v1::Metrics> Client::GetMetrics() {
+  return Call<v1::Metrics>(impl_->connection, &Stub::GetMetrics, v1::MetricsRequest());
 }
 
 }  // namespace calib::client

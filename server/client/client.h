@@ -2,6 +2,7 @@
 // The service as seen by calibctl: one blocking call per question. No gRPC header is needed to use
 // it.
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "proto/rpc/access.h"
+#include "server/messages/backup_seal.h"
 
 namespace grpc {
 class Channel;
@@ -49,7 +51,15 @@ class Client {
   absl::StatusOr<std::string> GetBlob(const std::string& digest);
   absl::StatusOr<v1::SubmitReply> Submit(const v1::SubmitRequest& request);
   absl::StatusOr<v1::CampaignStatus> AddRuns(const v1::AddRunsRequest& request);
-  absl::StatusOr<std::vector<v1::CampaignStatus>> List();
+  /// Some of the campaigns, in the order of their ids.
+  struct Part {
+    std::optional<int> limit{};  ///< at most so many
+    std::string after{};         ///< those behind this one; empty: from the first
+    std::string parent{};        ///< only those that come from this one; empty: any
+  };
+  /// NOT_FOUND: no campaign was ever called as `after` or `parent`.
+  absl::StatusOr<std::vector<v1::CampaignStatus>> List(const Part& part);
+  absl::StatusOr<std::vector<v1::CampaignStatus>> List() { return List(Part{}); }
   absl::StatusOr<v1::CampaignStatus> Show(const std::string& campaign);
   /// Calls `seen` with every status until the campaign ends.
   absl::Status Watch(const std::string& campaign,
@@ -79,6 +89,17 @@ class Client {
   absl::StatusOr<v1::WorkerInfo> DrainWorker(const std::string& worker,
                                              std::chrono::milliseconds within = {});
   absl::StatusOr<v1::ServerReport> Examine();
+  absl::StatusOr<v1::Metrics> GetMetrics();
+  /// What takes a backup as it comes.
+  struct BackupSink {
+    std::function<absl::Status()> begin{};  ///< what came before is void; called at least once
+    std::function<absl::Status(const std::string&)> add{};
+  };
+  /// A backup of all the server holds; the sink has got all of it when this is OK. Errors of the
+  /// sink end it.
+  absl::StatusOr<messages::BackupSeal> Backup(const BackupSink& sink);
+  /// keep_states: of each campaign that is over, those of so many samples.
+  absl::StatusOr<v1::PruneReply> Prune(std::optional<int> keep_states);
 
  private:
   struct Impl;

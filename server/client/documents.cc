@@ -54,24 +54,8 @@ absl::StatusOr<Kept> KeptOf(Client& client, const std::vector<v1::Finding>& find
 
 }  // namespace
 
-absl::StatusOr<std::vector<v1::CampaignStatus>> List(Client& client, const ListPart& part) {
-  ASSIGN_OR_RETURN(auto campaigns, client.List());
-  if (!part.after.empty()) {
-    const auto after = std::find_if(campaigns.begin(), campaigns.end(),
-                                    [&part](const auto& c) { return c.campaign() == part.after; });
-    if (after == campaigns.end()) {
-      return absl::NotFoundError(absl::StrCat("there is no campaign \"", part.after, "\""));
-    }
-    campaigns.erase(campaigns.begin(), after + 1);
-  }
-  if (part.limit && static_cast<std::size_t>(*part.limit) < campaigns.size()) {
-    campaigns.resize(static_cast<std::size_t>(*part.limit));
-  }
-  return campaigns;
-}
-
-absl::StatusOr<std::string> ListDocument(Client& client, const ListPart& part) {
-  ASSIGN_OR_RETURN(const auto campaigns, List(client, part));
+absl::StatusOr<std::string> ListDocument(Client& client, const Client::Part& part) {
+  ASSIGN_OR_RETURN(const auto campaigns, client.List(part));
   return report::StatusListJson(campaigns);
 }
 
@@ -85,7 +69,7 @@ absl::StatusOr<std::vector<std::string>> WarningsOf(Client& client, const std::s
 absl::StatusOr<std::string> ShowDocument(Client& client, const std::string& campaign) {
   report::Shown shown;
   ASSIGN_OR_RETURN(shown.status, client.Show(campaign));
-  ASSIGN_OR_RETURN(const auto campaigns, client.List());
+  ASSIGN_OR_RETURN(const auto campaigns, client.List({.parent = campaign}));
   shown.children = report::ChildrenOf(campaigns, campaign);
   ASSIGN_OR_RETURN(shown.findings, client.Findings(campaign));
   ASSIGN_OR_RETURN(shown.warnings, WarningsOf(client, campaign));

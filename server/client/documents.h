@@ -18,14 +18,7 @@ namespace calib::client {
 
 // Errors of all: those of Client. shelf: where campaigns may have been read before; null: nowhere.
 
-/// Part of a list: at most `limit` campaigns, those behind the one named `after`.
-struct ListPart {
-  std::optional<int> limit{};
-  std::string after{};  ///< empty: from the first
-};
-/// NOT_FOUND: there is no campaign `after`.
-absl::StatusOr<std::vector<v1::CampaignStatus>> List(Client& client, const ListPart& part);
-absl::StatusOr<std::string> ListDocument(Client& client, const ListPart& part = {});
+absl::StatusOr<std::string> ListDocument(Client& client, const Client::Part& part);
 absl::StatusOr<std::string> ShowDocument(Client& client, const std::string& campaign);
 /// Everything that a campaign comes from, and that comes from them (report::FamilyOf). NOT_FOUND:
 /// there is no such campaign.

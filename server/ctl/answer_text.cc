@@ -278,6 +278,9 @@ std::string StatusText(const v1::CampaignStatus& s) {
                      s.campaign(), s.name(), s.owner().empty() ? "" : ", of " + s.owner(),
                      client::ProgressText(s), s.model_evaluations(), Number(s.core_hours(), 3),
                      s.method()) +
+         (s.has_kept_states()
+              ? fmt::format("It was pruned: the states of {} samples are kept.\n", s.kept_states())
+              : "") +
          (s.problem().empty() ? "" : report::Wrapped(s.problem(), "! ", "  ")) +
          (s.nobody_may().empty()
               ? ""

@@ -18,6 +18,9 @@ namespace {
 
 constexpr double kMebibyte = 1024.0 * 1024.0;
 constexpr double kGibibyte = 1024.0 * kMebibyte;
+constexpr double kMuchEmpty = kGibibyte;  // [bytes]
+constexpr double kLargeLog = 512 * kMebibyte;
+constexpr double kOldBackup = 30.0 * 86400.0;                     // [s]
 constexpr double kSlowSync = 0.25;                                // [s]
 constexpr double kLargestOffset = 1.0;                            // [s]
 constexpr std::int64_t kWarnedBefore = std::int64_t{30} * 86400;  // [s] the end of a certificate
@@ -200,6 +203,39 @@ Check JudgeDatabase(const v1::ServerReport& server) {
     check.found = "SQLite finds no fault.";
   }
   return check;
+}
+
+std::vector<Check> JudgeUpkeep(const v1::ServerReport& server) {
+  const auto bytes = static_cast<double>(server.database_bytes());
+  const auto empty = static_cast<double>(server.database_free_bytes());
+  Check size{.name = "file_system", .subject = "size of calib.db"};
+  size.found = absl::StrCat(Size(bytes), ", of which ", Size(empty), " hold nothing, and a log of ",
+                            Size(static_cast<double>(server.wal_bytes())), ".");
+  if (server.leaving() > 0) {
+    absl::StrAppend(&size.found, " What ", server.leaving(),
+                    server.leaving() == 1 ? " campaign has" : " campaigns have",
+                    " left behind is being removed.");
+  } else if (empty > kMuchEmpty && empty > bytes / 2) {
+    Worsen(size, Health::kWarning,
+           "Start the server again once its disk has room for a second calib.db: it then gives "
+           "empty room back to the disk.");
+  }
+  if (static_cast<double>(server.wal_bytes()) > kLargeLog) {
+    Worsen(size, Health::kWarning,
+           "Something has read calib.db for long, as a shell: end it, so that the log becomes "
+           "small.");
+  }
+  Check backup{.name = "backup", .subject = "server"};
+  if (server.last_backup_unix_ms() == 0) {
+    backup.found = "None was taken of this server; `calibctl backup -o FILE` takes one.";
+    return {size, backup};
+  }
+  const double age = 1e-3 * static_cast<double>(server.unix_ms() - server.last_backup_unix_ms());
+  backup.found = absl::StrCat("The last was taken ", report::Duration(std::max(0.0, age)), " ago.");
+  if (age > kOldBackup) {
+    Worsen(backup, Health::kWarning, "Take one by `calibctl backup -o FILE`, and do so regularly.");
+  }
+  return {size, backup};
 }
 
 std::optional<Check> JudgeWaiting(const v1::ServerReport& server) {

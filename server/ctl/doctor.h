@@ -19,6 +19,7 @@ std::string ToString(Health health);  ///< "ok", "unknown", "warning", "problem"
 /// One thing that was looked at.
 struct Check {
   std::string name;  ///< build | clock | file_system | time_step | certificates | server | workers
+                     ///< | backup
   std::string subject{};  ///< what the check is about
   Health health = Health::kOk;
   std::string found{};   ///< a sentence or two
@@ -47,6 +48,8 @@ Check JudgeClockOffset(double ahead, double uncertainty);
 enum class FolderUse { kState, kCheckpoints, kTemporary };
 Check JudgeFolder(const v1::FolderReport& folder, FolderUse use);
 Check JudgeDatabase(const v1::ServerReport& server);
+/// How large the state is, what is on its way out of it, and when it was last backed up.
+std::vector<Check> JudgeUpkeep(const v1::ServerReport& server);
 /// Only of a server that waits.
 std::optional<Check> JudgeWaiting(const v1::ServerReport& server);
 

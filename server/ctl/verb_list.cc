@@ -33,6 +33,8 @@ namespace calib::ctl {
   VERB(Cancel)            \
   VERB(Delete)            \
   VERB(Workers)           \
+  VERB(Backup)            \
+  VERB(Prune)             \
   VERB(Doctor)            \
   VERB(Drain)             \
   VERB(Scale)             \

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "proto/rpc/digest.h"
 #include "server/client/documents.h"
 #include "server/client/findings.h"
@@ -45,8 +46,21 @@ absl::StatusOr<std::string> Find(client::Client& client, client::CampaignShelf& 
           question.load_step);
     case Document::kWorkers:
       return client::WorkersDocument(client);
+    case Document::kMetrics: {
+      ASSIGN_OR_RETURN(const v1::Metrics metrics, client.GetMetrics());
+      return metrics.text();
+    }
+    case Document::kReady: {
+      ASSIGN_OR_RETURN(const v1::Metrics metrics, client.GetMetrics());
+      if (!metrics.not_ready().empty()) return absl::ResourceExhaustedError(metrics.not_ready());
+      return std::string("ok\n");
+    }
   }
   return absl::InternalError("no such document");
+}
+
+bool IsText(Document document) {
+  return document == Document::kMetrics || document == Document::kReady;
 }
 
 }  // namespace
@@ -74,17 +88,18 @@ void Answers::Get(const Question& question, const std::string& stamp, Then then)
   waiting->second.push_back(std::move(then));
   if (!is_first) return;
   Askers& askers = question.document == Document::kCompare ? slow_ : quick_;
-  const bool asked =
-      askers.Ask([this, question, key, stamp](const absl::StatusOr<client::Client*>& client) {
-        const absl::StatusOr<std::string> found =
-            client.ok() ? Find(**client, shelf_, question)
-                        : absl::StatusOr<std::string>(client.status());
-        const absl::StatusOr<Kept> kept = found.ok()
-                                              ? absl::StatusOr<Kept>(MakeKept(Compact(*found)))
-                                              : absl::StatusOr<Kept>(found.status());
-        post_([this, key, stamp, kept] { Found(key, stamp, kept); });
-        return found.status();
-      });
+  const bool asked = askers.Ask([this, question, key,
+                                 stamp](const absl::StatusOr<client::Client*>& client) {
+    const absl::StatusOr<std::string> found = client.ok()
+                                                  ? Find(**client, shelf_, question)
+                                                  : absl::StatusOr<std::string>(client.status());
+    const absl::StatusOr<Kept> kept =
+        found.ok()
+            ? absl::StatusOr<Kept>(MakeKept(IsText(question.document) ? *found : Compact(*found)))
+            : absl::StatusOr<Kept>(found.status());
+    post_([this, key, stamp, kept] { Found(key, stamp, kept); });
+    return found.status();
+  });
   if (!asked) {
     Found(key, stamp,
           absl::ResourceExhaustedError("more is asked at a time than this page answers"));

@@ -124,6 +124,8 @@ std::string Changes::StampOf(const Question& question) const {
   const Known known = found == campaigns_.end() ? Known{} : found->second;
   switch (question.document) {
     case Document::kWorkers:  // tells how long ago each was heard
+    case Document::kMetrics:
+    case Document::kReady:
       return "";
     case Document::kList:
       return absl::StrCat(epoch_, "/", any_, "/", waits_);

@@ -23,6 +23,8 @@ namespace {
 
 constexpr const char* kJson = "application/json";
 constexpr const char* kText = "text/plain; charset=utf-8";
+constexpr const char* kMetricsText = "text/plain; version=0.0.4; charset=utf-8";
+constexpr const char* kNoAnswer = "the server that the page asks does not answer";
 /// Scripts, styles and questions of this page alone; pictures that it has drawn itself.
 constexpr const char* kContentPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -150,16 +152,14 @@ struct Page::Impl {
   void Handle(const HttpRequest& request, const HttpServer::Finish& finish);
   HttpAnswer File(const HttpRequest& request, const std::string& name) const;
   void Ask(const HttpRequest& request, const Target& target, const HttpServer::Finish& finish);
+  /// A text that the server is asked for and everybody may see.
+  void AskOpenly(const HttpRequest& request, Document document, const HttpServer::Finish& finish);
   /// Answers what needs no token; empty: it needs one.
   std::optional<HttpAnswer> Open(const Target& target) const;
 };
 
 std::optional<HttpAnswer> Page::Impl::Open(const Target& target) const {
   if (target.path == std::vector<std::string>{"healthz"}) return Text(200, "ok");
-  if (target.path == std::vector<std::string>{"readyz"}) {
-    return changes.is_up() ? Text(200, "ok")
-                           : Text(503, "the server that the page asks does not answer");
-  }
   if (const auto cookie = admission->CookieFor(target); cookie) {
     HttpAnswer answer = AnswerOf(303, "");
     answer.headers.emplace_back("Set-Cookie", *cookie);
@@ -168,6 +168,25 @@ std::optional<HttpAnswer> Page::Impl::Open(const Target& target) const {
     return answer;
   }
   return std::nullopt;
+}
+
+void Page::Impl::AskOpenly(const HttpRequest& request, Document document,
+                           const HttpServer::Finish& finish) {
+  if (!changes.is_up()) {
+    finish(Text(503, kNoAnswer));
+    return;
+  }
+  answers->Get({.document = document}, "",
+               [request, finish, document](const absl::StatusOr<Kept>& kept) {
+                 if (kept.ok()) {
+                   finish(Send(request, *kept,
+                               document == Document::kMetrics ? kMetricsText : kText, "no-store"));
+                 } else if (absl::IsResourceExhausted(kept.status())) {
+                   finish(Text(503, std::string(kept.status().message())));
+                 } else {
+                   finish(Text(503, kNoAnswer));
+                 }
+               });
 }
 
 HttpAnswer Page::Impl::File(const HttpRequest& request, const std::string& name) const {
@@ -219,6 +238,14 @@ void Page::Impl::Handle(const HttpRequest& request, const HttpServer::Finish& fi
   if (!target.ok()) {
     finish(Refusal(request.target.size() > kLongestTarget ? 414 : 400,
                    std::string(target.status().message())));
+    return;
+  }
+  if (target->path == std::vector<std::string>{"metrics"}) {
+    AskOpenly(request, Document::kMetrics, finish);
+    return;
+  }
+  if (target->path == std::vector<std::string>{"readyz"}) {
+    AskOpenly(request, Document::kReady, finish);
     return;
   }
   if (auto open = Open(*target); open) {

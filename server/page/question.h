@@ -21,6 +21,8 @@ enum class Document {
   kStates,
   kGrains,
   kWorkers,
+  kMetrics,  ///< a text, as is kReady
+  kReady,
 };
 
 struct Question {

@@ -123,6 +123,9 @@ class Scheduler {
   void Concluded(std::int64_t campaign);
   /// Campaigns that are not over.
   std::size_t live() const { return runs_.size(); }
+  /// Evaluations that wait for a slot, and campaigns with a plan in the making.
+  std::size_t queued() const { return queue_.size(); }
+  std::size_t planning() const { return computing_.size(); }
 
  private:
   /// Writes what follows for a campaign. Where the store refuses it, memory is ahead of what is on

@@ -197,19 +197,22 @@ grpc::ServerUnaryReactor* CampaignsService::Cancel(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::Delete(Context* context,
                                                    const v1::ControlRequest* request,
                                                    v1::DeleteReply* /*reply*/) {
-  return Enter(context, Right::kChange, *request,
-               [this, request](Unary* reactor, const Caller& caller) {
-                 core_.Post([this, request, reactor, caller] {
-                   Control(
-                       "delete", caller, *request,
-                       [this](std::int64_t campaign, const auto& also, const auto& done) {
-                         core_.scheduler().Delete(campaign, also, done);
-                       },
-                       [reactor](const absl::StatusOr<std::int64_t>& campaign) {
-                         reactor->Finish(rpc::ToGrpc(campaign.status()));
-                       });
-                 });
-               });
+  return Enter(
+      context, Right::kChange, *request, [this, request](Unary* reactor, const Caller& caller) {
+        core_.Post([this, request, reactor, caller] {
+          Control(
+              "delete", caller, *request,
+              [this](std::int64_t campaign, const auto& also, const auto& done) {
+                core_.scheduler().Delete(campaign, also, [this, done](const absl::Status& status) {
+                  done(status);
+                  if (status.ok()) core_.tidying().Begin();
+                });
+              },
+              [reactor](const absl::StatusOr<std::int64_t>& campaign) {
+                reactor->Finish(rpc::ToGrpc(campaign.status()));
+              });
+        });
+      });
 }
 
 absl::StatusOr<NewFinding> CampaignsService::FindingToKeep(const v1::AddFindingRequest& request,
@@ -259,6 +262,7 @@ absl::StatusOr<scheduler::NewRuns> CampaignsService::RunsToAdd(const v1::AddRuns
   ASSIGN_OR_RETURN(auto reader, core_.Read());
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(runs.campaign));
   RETURN_IF_ERROR(MayChange(caller, request.campaign(), record.submitted.owner));
+  RETURN_IF_ERROR(CheckHasStates(record));
   return runs;
 }
 

@@ -1,16 +1,11 @@
 #include "server/service/campaigns_service.h"
 
-#include <algorithm>
-#include <chrono>
 #include <memory>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
-#include "dem/registry/catalog.h"
 #include "proto/rpc/status.h"
-#include "server/campaign/model/sha256.h"
-#include "server/messages/folder_report.h"
 #include "server/service/blob_stream.h"
 #include "server/service/calls.h"
 #include "server/service/queries.h"
@@ -19,25 +14,6 @@
 #include "server/service/watch_changes.h"
 
 namespace calib::service {
-namespace {
-
-constexpr std::chrono::seconds kLookingThroughTheFile{10};
-
-/// The certificate in a folder as it is by now, and why it cannot be used.
-void TellCertificate(const std::string& folder, std::int64_t now_unix_s, v1::ServerReport& report) {
-  const auto credentials = access::ReadCredentials(folder);
-  const absl::Status usable =
-      credentials.ok() ? access::CheckOwn(*credentials, now_unix_s) : credentials.status();
-  report.set_certificate_problem(std::string(usable.message()));
-  if (credentials.ok()) {
-    report.set_certificate(credentials->holder.name);
-    report.set_certificate_end_unix_s(
-        std::max<std::int64_t>(0, credentials->holder.not_after_unix_s));
-  }
-}
-
-}  // namespace
-
 grpc::ServerUnaryReactor* CampaignsService::Enter(
     Context* context, Right right, const google::protobuf::Message& request,
     const std::function<void(Unary*, const Caller&)>& go_on) {
@@ -122,18 +98,20 @@ grpc::ServerUnaryReactor* CampaignsService::Show(Context* context,
 
 grpc::ServerUnaryReactor* CampaignsService::List(Context* context, const v1::ListRequest* request,
                                                  v1::ListReply* reply) {
-  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
-    core_.Post([this, reactor, reply] {
-      core_.Tell(
-          [this, reactor, reply, live = core_.scheduler().AllLive(), waits = core_.WaitsFor()] {
-            auto reader = core_.Read();
-            Answer(reactor,
-                   reader.ok() ? ListOf(*reader, live, waits, &finished_)
-                               : absl::StatusOr<v1::ListReply>(reader.status()),
-                   reply);
-          });
-    });
-  });
+  return Enter(context, Right::kRead, *request,
+               [this, request, reply](Unary* reactor, const Caller&) {
+                 core_.Post([this, reactor, request, reply] {
+                   core_.Tell([this, reactor, request, reply, live = core_.scheduler().AllLive(),
+                               waits = core_.WaitsFor()] {
+                     const auto list = [&]() -> absl::StatusOr<v1::ListReply> {
+                       ASSIGN_OR_RETURN(auto reader, core_.Read());
+                       ASSIGN_OR_RETURN(const auto campaigns, Asked(reader, *request, descent_));
+                       return ListOf(reader, campaigns, live, waits, &finished_);
+                     };
+                     Answer(reactor, list(), reply);
+                   });
+                 });
+               });
 }
 
 grpc::ServerUnaryReactor* CampaignsService::GetPosterior(Context* context,
@@ -254,36 +232,6 @@ grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
                    Answer(reactor, std::move(worker), reply);
                  });
                });
-}
-
-grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
-                                                    const v1::ExamineRequest* request,
-                                                    v1::ServerReport* reply) {
-  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
-    v1::ServerReport report;
-    report.set_unix_ms(core_.UnixMs());
-    core_.Post([this, reply, reactor, report = std::move(report)]() mutable {
-      report.set_waits(core_.WaitsFor());
-      for (v1::RefusedWorker& worker : core_.scheduler().Refused()) {
-        *report.add_refused() = std::move(worker);
-      }
-      core_.Tell([this, reply, reactor, report = std::move(report)]() mutable {
-        report.set_engine_version(dem::EngineVersion());
-        report.set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
-        report.set_listen(site_.listen);
-        if (!site_.tls.empty()) {
-          TellCertificate(site_.tls, report.unix_ms() / 1000, report);
-        }
-        *report.mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
-        auto reader = core_.Read();
-        const auto check = reader.ok() ? reader->CheckFile(kLookingThroughTheFile)
-                                       : absl::StatusOr<store::Reader::FileCheck>(reader.status());
-        report.set_database(check.ok() ? check->fault : std::string(check.status().message()));
-        report.set_database_in_full(check.ok() && check->in_full);
-        Answer(reactor, absl::StatusOr<v1::ServerReport>(std::move(report)), reply);
-      });
-    });
-  });
 }
 
 }  // namespace calib::service

@@ -56,6 +56,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   Unary* ListWorkers(Context*, const v1::ListWorkersRequest*, v1::WorkerList*) override;
   Unary* DrainWorker(Context*, const v1::DrainRequest*, v1::WorkerInfo*) override;
   Unary* Examine(Context*, const v1::ExamineRequest*, v1::ServerReport*) override;
+  Unary* GetMetrics(Context*, const v1::MetricsRequest*, v1::Metrics*) override;
+  grpc::ServerWriteReactor<v1::BlobChunk>* Backup(Context*, const v1::BackupRequest*) override;
+  Unary* Prune(Context*, const v1::PruneRequest*, v1::PruneReply*) override;
 
  private:
   using Act = std::function<void(std::int64_t campaign, const store::Store::Job& also,
@@ -100,10 +103,12 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
                            const Act& act);
 
   FinishedStatuses finished_;
+  Descent descent_;
   Core& core_;
   const Site site_;
   ToldExperiments told_;
-  Requests requests_;              // the strand's
+  Requests requests_;  // the strand's
+  std::atomic<bool> backs_up_ = false;
   std::atomic<int> read_now_ = 0;  // submissions that are read, or wait to be
 };
 

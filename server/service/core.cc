@@ -16,10 +16,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::service {
 namespace {
 
+constexpr std::chrono::hours kTidiedAgain{1};
 constexpr int kPlanThreads = 2;   // the long computations between iterations
 constexpr int kParseThreads = 2;  // campaigns that are parsed, factorised and loaded
 constexpr int kTellThreads = 2;   // lists and streams
@@ -41,10 +43,12 @@ struct Core::Threads {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> keep_running{
       strand.get_executor()};
   boost::asio::steady_timer tick{strand};
+  boost::asio::steady_timer pause{strand};
   boost::asio::thread_pool plans{kPlanThreads};
   boost::asio::thread_pool parse{kParseThreads};
   boost::asio::thread_pool tell{kTellThreads};
   boost::asio::thread_pool query{kQueryThreads};
+  boost::asio::thread_pool look_after{1};
 };
 
 Core::Core(std::unique_ptr<store::Store> store, std::unique_ptr<Guard> guard,
@@ -57,6 +61,7 @@ Core::Core(std::unique_ptr<store::Store> store, std::unique_ptr<Guard> guard,
       threads_(std::make_unique<Threads>()),
       store_(std::move(store)),
       scheduler_(*this, options),
+      tidying_(TidyingSite()),
       thread_([this] { threads_->strand.run(); }) {
   store_->Watch([this](const absl::Status& room) { Post([this, room] { HearOfRoom(room); }); });
 }
@@ -67,6 +72,7 @@ Core::~Core() {
   threads_->parse.join();
   threads_->tell.join();
   threads_->query.join();
+  threads_->look_after.join();
   threads_->keep_running.reset();
   thread_.join();
   // The store then finishes what it was given; nobody waits for those answers any more.
@@ -76,11 +82,14 @@ absl::Status Core::Start() {
   absl::Status status = scheduler_.Load();
   if (status.ok()) {
     ScheduleTick();
+    tidied_ = std::chrono::steady_clock::now();
+    tidying_.Begin();
   }
   return status;
 }
 
 void Core::BeginShutdown() {
+  ends_ = true;
   Post([this] {
     if (health_.ok()) {
       health_ = absl::UnavailableError("the server is going down");
@@ -89,6 +98,7 @@ void Core::BeginShutdown() {
       session->Close(absl::UnavailableError("the server is going down"));
     }
     threads_->tick.cancel();
+    threads_->pause.cancel();
     store_->StopWaiting();  // else what it waits to write would keep its calls open
   });
 }
@@ -96,7 +106,11 @@ void Core::BeginShutdown() {
 boost::asio::io_context& Core::strand() { return threads_->strand; }
 
 void Core::Post(std::function<void()> task) {
-  boost::asio::post(threads_->strand, std::move(task));
+  boost::asio::post(threads_->strand,
+                    [this, task = std::move(task), asked = std::chrono::steady_clock::now()] {
+                      strand_lag_.Add(std::chrono::steady_clock::now() - asked);
+                      task();
+                    });
 }
 
 void Core::Query(std::function<void()> task) {
@@ -109,6 +123,31 @@ void Core::Parse(std::function<void()> task) {
   boost::asio::post(threads_->parse, std::move(task));
 }
 
+void Core::LookAfter(std::function<void()> task) {
+  boost::asio::post(threads_->look_after, std::move(task));
+}
+
+Tidying::Site Core::TidyingSite() {
+  return {.write =
+              [this](store::Store::Job job, std::function<void(const absl::Status&)> then) {
+                WriteIfRoom(std::move(job), std::move(then));
+              },
+          .read = [this] { return Read(); },
+          .aside =
+              [this](std::function<std::function<void()>()> work) {
+                LookAfter([this, work = std::move(work)] { Post(work()); });
+              },
+          .after =
+              [this](std::chrono::steady_clock::duration pause, std::function<void()> task) {
+                threads_->pause.expires_after(pause);
+                threads_->pause.async_wait(
+                    [this, task = std::move(task)](const boost::system::error_code& error) {
+                      if (!error && health_.ok()) task();
+                    });
+              },
+          .unix_ms = [this] { return UnixMs(); }};
+}
+
 std::int64_t Core::AddSession(Session* session) {
   sessions_[++last_session_] = session;
   return last_session_;
@@ -119,22 +158,26 @@ void Core::RemoveSession(std::int64_t session) {
   scheduler_.Disconnected(session);
 }
 
-store::Store::Done Core::OnceWritten(std::function<void(const absl::Status&)> then) {
-  // Shared, for what it holds, as an answer, would be copied on its way to the strand.
-  return
-      [this, then = std::make_shared<std::function<void(const absl::Status&)>>(std::move(then))](
-          const absl::Status& status) { Post([this, status, then] { Written(status, *then); }); };
-}
-
 void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->Write(std::move(job), OnceWritten(std::move(then)));
+  store_->Write(std::move(job), TellsOf(std::move(then)));
 }
 
 void Core::WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->WriteIfRoom(std::move(job), OnceWritten(std::move(then)));
+  store_->WriteIfRoom(std::move(job), TellsOf(std::move(then)));
 }
 
-void Core::Written(absl::Status status, const std::function<void(const absl::Status&)>& then) {
+store::Store::Done Core::TellsOf(std::function<void(const absl::Status&)> then) {
+  // Shared, for what it holds, as an answer, would be copied on its way to the strand.
+  return [this, asked = std::chrono::steady_clock::now(),
+          then = std::make_shared<std::function<void(const absl::Status&)>>(std::move(then))](
+             const absl::Status& status) {
+    Post([this, status, asked, then] { Written(status, asked, *then); });
+  };
+}
+
+void Core::Written(absl::Status status, std::chrono::steady_clock::time_point asked,
+                   const std::function<void(const absl::Status&)>& then) {
+  acknowledgements_.Add(std::chrono::steady_clock::now() - asked);
   if (absl::IsInvalidArgument(status)) {  // its own rows: nothing else is the worse for it
     spdlog::error("write_refused reason=\"{}\"", std::string(status.message()));
   } else if (absl::IsResourceExhausted(status)) {
@@ -183,6 +226,30 @@ std::string Core::WaitsFor() const {
   return absl::StrCat("the disk of the state folder takes nothing since ",
                       InUtc(wait_->began_unix_ms), " (", wait_->reason, "; ", FreeSpace(),
                       "); the server goes on by itself when it does");
+}
+
+Measured Core::Measure() const {
+  Measured measured{
+      .engine = dem::EngineVersion(),
+      .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count(),
+      .store_waits = wait_.has_value(),
+      .campaigns = scheduler_.live(),
+      .queued = scheduler_.queued(),
+      .planning = scheduler_.planning(),
+      .store = store_->Numbers(),
+      .acknowledgements = acknowledgements_.Read(),
+      .strand_lag = strand_lag_.Read()};
+  for (const v1::WorkerInfo& worker : scheduler_.Workers()) {
+    if (!worker.connected()) {
+      measured.silent += worker.left() ? 0 : 1;
+      continue;
+    }
+    ++measured.workers;
+    measured.draining += worker.draining() ? 1 : 0;
+    measured.slots += worker.slots();
+    measured.busy += worker.busy();
+  }
+  return measured;
 }
 
 absl::Status Core::WhyNotStore() const {
@@ -240,6 +307,10 @@ void Core::ScheduleTick() {
   threads_->tick.async_wait([this](const boost::system::error_code& error) {
     if (!error && health_.ok()) {
       scheduler_.Tick();
+      if (const auto now = std::chrono::steady_clock::now(); now - tidied_ > kTidiedAgain) {
+        tidied_ = now;
+        tidying_.Begin();
+      }
       ScheduleTick();
     }
   });

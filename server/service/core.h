@@ -5,6 +5,7 @@
 // move data between the wire and here. A queue of these threads holds one task of each call that is
 // open, of which the door lets in so many.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -18,6 +19,8 @@
 #include "server/scheduler/scheduler.h"
 #include "server/service/door.h"
 #include "server/service/guard.h"
+#include "server/service/upkeep/metrics.h"
+#include "server/service/upkeep/tidying.h"
 #include "server/store/store.h"
 
 namespace boost::asio {
@@ -60,16 +63,23 @@ class Core final : public scheduler::Ports {
   void Tell(std::function<void()> task);
   /// Runs on the pool for campaigns that are read, which may take seconds: no answer waits for it.
   void Parse(std::function<void()> task);
+  /// Runs on a thread for what takes as long as the whole state is large, one after the other.
+  void LookAfter(std::function<void()> task);
+  /// Whether the server goes down.
+  bool ends() const { return ends_; }
   Door& door() { return door_; }
   Guard& guard() { return *guard_; }
 
   // ---- on the strand only ----
   scheduler::Scheduler& scheduler() { return scheduler_; }
+  Tidying& tidying() { return tidying_; }
   /// OK while the service takes work; UNAVAILABLE when it is going down; else why the store cannot
   /// be written.
   const absl::Status& health() const { return health_; }
   /// What the server waits for before it stores anything more, a sentence; empty: nothing.
   std::string WaitsFor() const;
+  /// What is counted and measured, now.
+  Measured Measure() const;
   /// Why no change is taken: health(), or RESOURCE_EXHAUSTED while the disk has no room; OK: it is.
   absl::Status WhyNotStore() const;
   /// Grows whenever something changed that a status shows.
@@ -98,15 +108,17 @@ class Core final : public scheduler::Ports {
 
  private:
   void Fail(const absl::Status& status);
-  /// Has Written() called for it on the strand.
-  store::Store::Done OnceWritten(std::function<void(const absl::Status&)> then);
-  /// What the store has said of a write, on the strand.
-  void Written(absl::Status status, const std::function<void(const absl::Status&)>& then);
+  /// What the store has said of a write that was asked for at `asked`, on the strand.
+  void Written(absl::Status status, std::chrono::steady_clock::time_point asked,
+               const std::function<void(const absl::Status&)>& then);
+  /// To be called by the store: Written() on the strand.
+  store::Store::Done TellsOf(std::function<void(const absl::Status&)> then);
   /// On the strand: writing waits for room, or goes on.
   void HearOfRoom(const absl::Status& room);
   /// As "0.3 MiB are free".
   std::string FreeSpace() const;
   void ScheduleTick();
+  Tidying::Site TidyingSite();
 
   const scheduler::SchedulerOptions options_;
   const std::function<void(const absl::Status&)> on_failure_;
@@ -117,8 +129,11 @@ class Core final : public scheduler::Ports {
   const std::unique_ptr<Threads> threads_;
   std::unique_ptr<store::Store> store_;
   scheduler::Scheduler scheduler_;
+  Tidying tidying_;
+  std::chrono::steady_clock::time_point tidied_{};  // when it was begun last
   absl::Status health_;
   bool failed_ = false;
+  std::atomic<bool> ends_ = false;
   struct Wait {
     std::string reason;
     std::chrono::steady_clock::time_point began{};
@@ -127,6 +142,8 @@ class Core final : public scheduler::Ports {
   std::optional<Wait> wait_;                       // the disk has no room
   std::chrono::steady_clock::duration waited_{0};  // of waits that are over
   std::uint64_t changes_of_room_ = 0;
+  const std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+  store::Durations strand_lag_, acknowledgements_;
   std::map<std::int64_t, Session*> sessions_;
   std::int64_t last_session_ = 0;
   std::thread thread_;

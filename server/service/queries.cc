@@ -172,6 +172,14 @@ absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id) {
       absl::StrCat("there is no campaign \"", id, "\" (ids are like c1; see list)"));
 }
 
+absl::Status CheckHasStates(const store::CampaignRecord& record) {
+  if (!record.kept_states.has_value()) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("c", record.submitted.id, " was pruned: the states of ", *record.kept_states,
+                   " samples are kept, and this needs those of all; posterior, samples and "
+                   "kept findings are there"));
+}
+
 std::optional<v1::CampaignStatus> FinishedStatuses::Find(
     const store::CampaignRecord& record) const {
   if (record.progress.state != CampaignState::kFinished) return std::nullopt;
@@ -197,6 +205,7 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   if (may_keep) {
     if (auto kept = finished->Find(record)) {
       kept->set_server_waits(waits);
+      if (record.kept_states.has_value()) kept->set_kept_states(*record.kept_states);
       return *std::move(kept);
     }
   }
@@ -246,14 +255,63 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_parent(std::move(origin.parent));
   status.set_purpose(std::move(origin.purpose));
   status.mutable_effects()->Add(origin.effects.begin(), origin.effects.end());
+  if (record.kept_states.has_value()) status.set_kept_states(*record.kept_states);
   if (may_keep) finished->Keep(record, status);
   return status;
 }
 
+absl::StatusOr<std::vector<store::CampaignRecord>> Descent::ChildrenOf(store::Reader& reader,
+                                                                       std::int64_t parent) {
+  std::vector<std::int64_t> ids;
+  {
+    const absl::MutexLock lock(&mutex_);
+    ASSIGN_OR_RETURN(const auto texts, reader.TextsWith("lineage", read_to_));
+    for (const auto& [id, text] : texts) {
+      if (const auto from = ParseCampaign(campaign::OriginOf(text).parent); from.ok()) {
+        children_.emplace(*from, id);
+      }
+    }
+    ASSIGN_OR_RETURN(const auto last, reader.LastCampaign());
+    read_to_ = std::max(read_to_, last);
+    const auto [begin, end] = children_.equal_range(parent);
+    for (auto child = begin; child != end; ++child) ids.push_back(child->second);
+  }
+  std::vector<store::CampaignRecord> children;
+  for (const std::int64_t id : ids) {
+    auto child = reader.Campaign(id);
+    if (absl::IsNotFound(child.status())) continue;
+    RETURN_IF_ERROR(child.status());
+    children.push_back(*std::move(child));
+  }
+  return children;
+}
+
+absl::StatusOr<std::vector<store::CampaignRecord>> Asked(store::Reader& reader,
+                                                         const v1::ListRequest& request,
+                                                         Descent& descent) {
+  ASSIGN_OR_RETURN(const auto last, reader.LastCampaign());
+  const auto id_of = [last](const std::string& name) -> absl::StatusOr<std::int64_t> {
+    if (name.empty()) return std::int64_t{0};
+    const auto id = ParseCampaign(name);
+    if (id.ok() && *id > last) {
+      return absl::NotFoundError(absl::StrCat("there is no campaign \"", name, "\""));
+    }
+    return id;
+  };
+  ASSIGN_OR_RETURN(const auto after, id_of(request.after()));
+  ASSIGN_OR_RETURN(const auto parent, id_of(request.parent()));
+  if (parent == 0) return reader.Campaigns(after, request.limit());
+  ASSIGN_OR_RETURN(auto children, descent.ChildrenOf(reader, parent));
+  std::erase_if(children, [after](const auto& child) { return child.submitted.id <= after; });
+  const auto limit = static_cast<std::size_t>(request.limit());
+  if (limit > 0 && children.size() > limit) children.resize(limit);
+  return children;
+}
+
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
+                                     const std::vector<store::CampaignRecord>& campaigns,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live,
                                      const std::string& waits, FinishedStatuses* finished) {
-  ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   v1::ListReply list;
   for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;

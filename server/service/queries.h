@@ -38,6 +38,23 @@ class FinishedStatuses {
   std::map<std::int64_t, Kept> kept_ ABSL_GUARDED_BY(mutex_);
 };
 
+/// FAILED_PRECONDITION, a sentence: the campaign was pruned, and not all of its states are there.
+absl::Status CheckHasStates(const store::CampaignRecord& record);
+
+/// Which campaigns come from which: a campaign's text stays what it is, so that each is read once.
+/// Thread-safe.
+class Descent {
+ public:
+  /// Those that come from this one and are there, in the order of their ids.
+  absl::StatusOr<std::vector<store::CampaignRecord>> ChildrenOf(store::Reader& reader,
+                                                                std::int64_t parent);
+
+ private:
+  absl::Mutex mutex_;
+  std::int64_t read_to_ ABSL_GUARDED_BY(mutex_) = 0;  // id of the last that was read
+  std::multimap<std::int64_t, std::int64_t> children_ ABSL_GUARDED_BY(mutex_);
+};
+
 /// live: what the scheduler knows beyond the store; empty: nothing, the campaign is over. waits:
 /// what the server waits for; empty: nothing. finished: what is known already. A stored posterior
 /// that cannot be read is said in `problem`.
@@ -45,9 +62,13 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
                                             const std::optional<scheduler::LiveStatus>& live,
                                             const std::string& waits = "",
                                             FinishedStatuses* finished = nullptr);
-/// The status of every campaign, in the order of their ids. One that cannot be told says so in
-/// `problem`.
+/// The campaigns that a question is about. NOT_FOUND: none was ever called as `after` or `parent`.
+absl::StatusOr<std::vector<store::CampaignRecord>> Asked(store::Reader& reader,
+                                                         const v1::ListRequest& request,
+                                                         Descent& descent);
+/// The status of each of these. One that cannot be told says so in `problem`.
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
+                                     const std::vector<store::CampaignRecord>& campaigns,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live,
                                      const std::string& waits = "",
                                      FinishedStatuses* finished = nullptr);

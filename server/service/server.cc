@@ -1,22 +1,22 @@
 #include "server/service/server.h"
 
-#include <fcntl.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/security/tls_certificate_provider.h>
 #include <grpcpp/security/tls_credentials_options.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
-#include <spdlog/sinks/basic_file_sink.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <future>
 #include <utility>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
 #include "calib/return_if_error.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/client_options.h"
@@ -27,6 +27,7 @@
 #include "server/service/guard.h"
 #include "server/service/listener.h"
 #include "server/service/state_folder.h"
+#include "server/service/upkeep/backup.h"
 #include "server/service/worker_link_service.h"
 
 namespace calib::service {
@@ -42,6 +43,9 @@ constexpr int kLargestMessage = 2 * 1024 * 1024;
 /// Of a stream that has come in and was not taken yet [bytes]: without a bound of its own gRPC
 /// holds some 16 MB of each, as the network would have it.
 constexpr int kUnreadBytes = 512 * 1024;
+/// Each question for the schema holds one for as long as it is open; what the service itself does
+/// holds none.
+constexpr int kReflectionThreads = 16;
 /// Files that are no connections: the database, its readers, uploads, the log.
 constexpr std::int64_t kOtherFiles = 200;
 constexpr std::chrono::seconds kDefaultShutdown{5};
@@ -96,28 +100,6 @@ absl::Status CheckReach(const ServerOptions& options) {
   return own.ok() ? own : absl::InvalidArgumentError(own.message());
 }
 
-absl::Status StartLog(const std::string& file) {
-  if (!file.empty()) {  // made for its owner alone, which spdlog does not do
-    close(open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, S_IRUSR | S_IWUSR));
-  }
-  try {
-    // Not from spdlog's factories, which refuse a name that the server before still has here.
-    spdlog::sink_ptr sink;
-    if (file.empty()) {
-      sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
-    } else {
-      sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(file);
-    }
-    auto logger = std::make_shared<spdlog::logger>("calibd", std::move(sink));
-    spdlog::set_default_logger(std::move(logger));
-  } catch (const spdlog::spdlog_ex& error) {
-    return absl::ResourceExhaustedError(absl::StrCat("log: ", error.what()));
-  }
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
-  spdlog::flush_on(spdlog::level::info);
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 struct Server::Impl {
@@ -130,6 +112,22 @@ struct Server::Impl {
   std::unique_ptr<Listener> listener;  // goes first: it hands connections to the acceptor
   std::string address;
   std::string inside;  // shown over channels inside this process
+  absl::Mutex mutex;
+  grpc::HealthCheckServiceInterface* health ABSL_GUARDED_BY(mutex) = nullptr;  // of grpc
+
+  /// Whether it serves, to who asks by grpc.health.v1, of all or of one service. On any thread.
+  void Tell(bool serves) {
+    const absl::MutexLock lock(&mutex);
+    if (health == nullptr) return;
+    health->SetServingStatus(serves);
+    health->SetServingStatus(v1::Campaigns::service_full_name(), serves);
+    health->SetServingStatus(v1::WorkerLink::service_full_name(), serves);
+  }
+  void TellNoMore() {
+    Tell(false);
+    const absl::MutexLock lock(&mutex);
+    health = nullptr;
+  }
 
   /// token: left for programs of this account before anybody is let in; empty: nobody needs one.
   absl::Status Listen(const std::string& listen, const std::string& tls, const std::string& token,
@@ -138,7 +136,11 @@ struct Server::Impl {
     const std::int64_t most =
         std::max<std::int64_t>(1, std::min<std::int64_t>(limits.connections, files - kOtherFiles));
     ASSIGN_OR_RETURN(listener, Listener::Open(listen, static_cast<int>(most)));
+    // Open to all, as the schema and whether a server serves are: for grpcurl and who balances.
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
+    builder.SetResourceQuota(grpc::ResourceQuota("calibd").SetMaxThreads(kReflectionThreads));
     using Type = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
     acceptor =
         builder.experimental().AddExternalConnectionAcceptor(Type::FROM_FD, CredentialsOf(tls));
@@ -159,6 +161,11 @@ struct Server::Impl {
     if (grpc == nullptr) {
       return absl::InternalError("gRPC does not start");
     }
+    {
+      const absl::MutexLock lock(&mutex);
+      health = grpc->GetHealthCheckService();
+    }
+    Tell(true);
     if (!token.empty() && listener->port() != 0) {
       if (const auto left = folder->LeaveToken(token, listener->port()); !left.ok()) {
         spdlog::warn("token_not_left reason=\"{}\"", std::string(left.message()));
@@ -192,13 +199,14 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   }
   RETURN_IF_ERROR(CheckReach(options));
   ASSIGN_OR_RETURN(auto folder, StateFolder::Open(options.state_dir));
-  RETURN_IF_ERROR(StartLog(options.log_file));
+  RETURN_IF_ERROR(StartLog(options.log_file, options.log));
   ASSIGN_OR_RETURN(const std::string token, folder->Token());
   ASSIGN_OR_RETURN(const std::string inside, access::MakeToken());
   ASSIGN_OR_RETURN(auto guard, Guard::Open(options.tls, token, AccountName(), inside));
   if (options.listen.empty()) {
     ASSIGN_OR_RETURN(options.listen, folder->SocketAddress());
   }
+  RemoveHalfBackup(options.state_dir);
   ASSIGN_OR_RETURN(auto store,
                    store::Store::Open(folder->DatabasePath(), std::move(options.store_hooks)));
   auto impl = std::make_unique<Impl>();
@@ -210,7 +218,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
                                   .heartbeat = options.heartbeat,
                                   .most_slots = options.limits.slots,
                                   .most_campaigns = options.limits.campaigns},
-      options.limits, [on_failure = std::move(options.on_failure)](const absl::Status& status) {
+      options.limits,
+      [on_failure = std::move(options.on_failure), self = impl.get()](const absl::Status& status) {
+        self->Tell(false);
         if (on_failure) {
           on_failure(status);
         }
@@ -246,6 +256,7 @@ void Server::Shutdown(std::chrono::milliseconds deadline) {
     return;
   }
   spdlog::info("shutdown address={}", impl_->address);
+  impl_->TellNoMore();
   impl_->listener.reset();
   impl_->core->BeginShutdown();
   impl_->grpc->Shutdown(std::chrono::system_clock::now() + deadline);

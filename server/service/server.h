@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/service/limits.h"
+#include "server/service/upkeep/log.h"
 #include "server/store/store.h"
 
 namespace grpc {
@@ -34,6 +35,7 @@ struct ServerOptions {
   std::chrono::milliseconds heartbeat{2'000};  ///< workers speak at least this often
   Limits limits{};
   std::string log_file{};  ///< appended to; empty: standard error
+  LogForm log{};
   /// Called once, on another thread, when the state can no longer be written (I/O error; a full
   /// disk is waited for): the server has stopped taking work and is to be shut down.
   std::function<void(const absl::Status&)> on_failure{};

@@ -76,10 +76,20 @@ absl::Status StatePieces::Begin(store::Reader& reader) {
   return absl::OkStatus();
 }
 
+absl::Status StatePieces::CheckAreThere(store::Reader& reader) const {
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(id_));
+  if (record.kept_states.has_value() && sample_.has_value()) {
+    ASSIGN_OR_RETURN(const bool keeps, reader.KeepsStates(id_, *sample_));
+    if (keeps) return absl::OkStatus();
+  }
+  return CheckHasStates(record);
+}
+
 absl::StatusOr<std::vector<v1::SampleStates>> StatePieces::Next(store::Reader& reader) {
   if (!std::exchange(begun_, true)) {
     RETURN_IF_ERROR(Begin(reader));
   }
+  RETURN_IF_ERROR(CheckAreThere(reader));  // it may have gone since the piece before
   std::vector<v1::SampleStates> messages;
   for (std::size_t read = 0; read < kStates && next_ < samples_.size(); ++next_) {
     ASSIGN_OR_RETURN(const auto states, reader.States(id_, samples_[next_]));

@@ -43,11 +43,12 @@ class StatePieces {
       : told_(told), campaign_(std::move(campaign)), sample_(sample) {}
 
   /// Of the next samples that have states, one message per evaluation; none: that was all.
-  /// NOT_FOUND: no such campaign or sample.
+  /// NOT_FOUND: no such campaign or sample. FAILED_PRECONDITION: they were pruned.
   absl::StatusOr<std::vector<v1::SampleStates>> Next(store::Reader& reader);
 
  private:
   absl::Status Begin(store::Reader& reader);
+  absl::Status CheckAreThere(store::Reader& reader) const;
 
   ToldExperiments& told_;
   const std::string campaign_;

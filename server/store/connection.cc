@@ -15,6 +15,8 @@ namespace {
 
 constexpr int kBusyTimeoutMs = 5000;
 constexpr mode_t kOwnersAlone = 0600;
+/// The log beside the file is cut to this once all of it is in the file [bytes].
+constexpr const char* kLargestLog = "PRAGMA journal_size_limit=67108864";
 constexpr const char* kNeedsRoom = "; its disk needs room";
 
 /// What a disk wants that takes nothing now, though the file is as it should be; empty: it is not
@@ -108,7 +110,9 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(const std::string& 
 
 void Connection::SetUp() {
   if (writable_) {
+    database_.exec("PRAGMA auto_vacuum=INCREMENTAL");  // of a file that is made now
     database_.exec("PRAGMA journal_mode=WAL");
+    database_.exec(kLargestLog);
     database_.exec("PRAGMA synchronous=FULL");
     database_.exec("PRAGMA foreign_keys=ON");
   }
@@ -119,14 +123,15 @@ absl::Status Connection::StatusOf(const SQLite::Exception& error) const {
 }
 
 SQLite::Statement& Connection::Prepare(std::string_view sql) {
-  auto& statement = statements_[sql];
-  if (statement == nullptr) {
-    statement = std::make_unique<SQLite::Statement>(database_, std::string(sql));
-  } else {
-    statement->tryReset();  // an error of its last run has been told
-    statement->clearBindings();
+  const auto known = statements_.find(sql);
+  if (known == statements_.end()) {
+    const std::string text(sql);
+    auto prepared = std::make_unique<SQLite::Statement>(database_, text);
+    return *statements_.emplace(text, std::move(prepared)).first->second;
   }
-  return *statement;
+  known->second->tryReset();  // an error of its last run has been told
+  known->second->clearBindings();
+  return *known->second;
 }
 
 std::vector<double> ToDoubles(const SQLite::Column& column) {

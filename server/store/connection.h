@@ -88,7 +88,7 @@ class Connection {
 
   SQLite::Database database_;
   const bool writable_;
-  std::map<std::string_view, std::unique_ptr<SQLite::Statement>> statements_;  // keys: literals
+  std::map<std::string, std::unique_ptr<SQLite::Statement>, std::less<>> statements_;  // by text
 };
 
 /// The doubles of a DoubleBlob, bit for bit.

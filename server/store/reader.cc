@@ -14,6 +14,8 @@
 #include "calib/return_if_error.h"
 #include "server/store/blob_file.h"
 #include "server/store/connection.h"
+#include "server/store/removal.h"
+#include "server/store/whole_copy.h"
 
 namespace calib::store {
 namespace {
@@ -65,6 +67,9 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   progress.pause_waived = row.getColumn(14).getInt() != 0;
   submitted.reading_rules = row.getColumn(15).getInt();
   submitted.owner = row.getColumn(16).getString();
+  if (!row.isColumnNull(17)) {
+    record.kept_states = row.getColumn(17).getInt();
+  }
   return record;
 }
 
@@ -81,14 +86,16 @@ std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row)
   return records;
 }
 
-constexpr std::string_view kAllCampaigns =
+constexpr std::string_view kCampaignsAfter =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner FROM campaign "
-    "ORDER BY id";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner, "
+    "(SELECT kept FROM pruned WHERE campaign = id) FROM campaign "
+    "WHERE id > ? AND id NOT IN (SELECT campaign FROM leaving WHERE whole) ORDER BY id LIMIT ?";
 constexpr std::string_view kOneCampaign =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner FROM campaign "
-    "WHERE id = ?";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner, "
+    "(SELECT kept FROM pruned WHERE campaign = id) FROM campaign "
+    "WHERE id = ? AND id NOT IN (SELECT campaign FROM leaving WHERE whole)";
 
 }  // namespace
 
@@ -106,14 +113,30 @@ auto Reader::Guard(F read) -> absl::StatusOr<decltype(read())> {
   }
 }
 
-absl::StatusOr<std::vector<CampaignRecord>> Reader::Campaigns() {
+absl::StatusOr<std::vector<CampaignRecord>> Reader::Campaigns() { return Campaigns(0, 0); }
+
+absl::StatusOr<std::vector<CampaignRecord>> Reader::Campaigns(std::int64_t after, int most) {
   return Guard([&] {
     std::vector<CampaignRecord> records;
-    SQLite::Statement& row = connection_->Bind(kAllCampaigns);
+    SQLite::Statement& row = connection_->Bind(kCampaignsAfter, after, most > 0 ? most : -1);
     while (row.executeStep()) {
       records.push_back(ToCampaign(row));
     }
     return records;
+  });
+}
+
+absl::StatusOr<std::vector<std::pair<std::int64_t, std::string>>> Reader::TextsWith(
+    const std::string& word, std::int64_t after) {
+  return Guard([&] {
+    std::vector<std::pair<std::int64_t, std::string>> texts;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT id, yaml FROM campaign WHERE id > ? AND instr(yaml, ?) > 0 ORDER BY id", after,
+        word);
+    while (row.executeStep()) {
+      texts.emplace_back(row.getColumn(0).getInt64(), row.getColumn(1).getString());
+    }
+    return texts;
   });
 }
 
@@ -322,14 +345,22 @@ absl::StatusOr<std::vector<StateRecord>> Reader::StatesFrom(std::int64_t campaig
   });
 }
 
+absl::StatusOr<bool> Reader::KeepsStates(std::int64_t campaign, int sample) {
+  static const std::string kKeeps = absl::StrCat("SELECT ?2 IN (", kKeptSamples, ")");
+  return Guard([&] {
+    SQLite::Statement& row = connection_->Bind(kKeeps, campaign, sample);
+    return row.executeStep() && row.getColumn(0).getInt() != 0;
+  });
+}
+
 absl::StatusOr<std::optional<EvaluationKey>> Reader::FindEqual(const std::string& digest) {
+  static const std::string kFirst = absl::StrCat(
+      "SELECT campaign, sample, experiment FROM evaluation "
+      "WHERE digest = ? AND status IN ('finished', 'diverged') AND ",
+      kStaysWhole, " ORDER BY campaign, sample, experiment LIMIT 1");
   return Guard([&] {
     std::optional<EvaluationKey> key;
-    SQLite::Statement& row = connection_->Bind(
-        "SELECT campaign, sample, experiment FROM evaluation "
-        "WHERE digest = ? AND status IN ('finished', 'diverged') "
-        "ORDER BY campaign, sample, experiment LIMIT 1",
-        digest);
+    SQLite::Statement& row = connection_->Bind(kFirst, digest);
     if (row.executeStep()) {
       key = EvaluationKey{.campaign = row.getColumn(0).getInt64(),
                           .sample = row.getColumn(1).getInt(),
@@ -344,7 +375,7 @@ absl::StatusOr<std::vector<ActiveAttempt>> Reader::ActiveAttempts() {
     std::vector<ActiveAttempt> attempts;
     SQLite::Statement& row = connection_->Bind(
         "SELECT id, campaign, sample, experiment, worker FROM attempt WHERE outcome IS NULL "
-        "ORDER BY id");
+        "AND campaign NOT IN (SELECT campaign FROM leaving WHERE whole) ORDER BY id");
     while (row.executeStep()) {
       attempts.push_back({.id = row.getColumn(0).getInt64(),
                           .key = {.campaign = row.getColumn(1).getInt64(),
@@ -420,7 +451,8 @@ absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t
         "(wanted.campaign, wanted.sample, wanted.experiment)) "
         "JOIN attempt ON (attempt.campaign, attempt.sample, attempt.experiment) = "
         "(ran.campaign, ran.sample, ran.experiment) "
-        "WHERE wanted.campaign = ? AND wanted.sample BETWEEN ? AND ? "
+        "WHERE ran.campaign NOT IN (SELECT campaign FROM leaving WHERE whole) "
+        "AND wanted.campaign = ? AND wanted.sample BETWEEN ? AND ? "
         "GROUP BY wanted.sample, wanted.experiment, ran.campaign, ran.sample, ran.experiment "
         "HAVING spent > 0",
         campaign, sample.value_or(0), sample.value_or(std::numeric_limits<int>::max()));
@@ -439,7 +471,10 @@ absl::StatusOr<Effort> Reader::EffortOf(std::int64_t campaign) {
         "SELECT count(*) FROM evaluation WHERE campaign = ? AND NOT reused "
         "AND (status IN ('finished', 'diverged') OR (status = 'stopped_early' AND EXISTS "
         "(SELECT 1 FROM state WHERE state.campaign = evaluation.campaign AND "
-        "state.sample = evaluation.sample AND state.experiment = evaluation.experiment)))",
+        "state.sample = evaluation.sample AND state.experiment = evaluation.experiment "
+        "UNION ALL SELECT 1 FROM pruned, attempt WHERE pruned.campaign = evaluation.campaign AND "
+        "attempt.campaign = evaluation.campaign AND attempt.sample = evaluation.sample AND "
+        "attempt.experiment = evaluation.experiment)))",
         campaign);
     if (evaluations.executeStep()) {
       effort.model_evaluations = evaluations.getColumn(0).getInt64();
@@ -480,6 +515,49 @@ absl::StatusOr<std::vector<FindingRecord>> Reader::Findings(std::int64_t campaig
                           .created_unix_ms = row.getColumn(2).getInt64()});
     }
     return findings;
+  });
+}
+
+absl::Status Reader::CopyTo(const std::string& path, const std::function<bool()>& goes_on) {
+  const auto copied = Guard([&] {
+    connection_->Bind("SELECT count(*) FROM sqlite_schema")
+        .executeStep();  // from now on one picture
+    return CopyWhole(connection_->database(), path, goes_on);
+  });
+  return copied.ok() ? *copied : copied.status();
+}
+
+absl::StatusOr<std::int64_t> Reader::LastBackupUnixMs() {
+  return Guard([&] {
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT coalesce(max(unix_ms), 0) FROM event WHERE campaign IS NULL AND what = ?",
+        kBackupEvent);
+    return row.executeStep() ? row.getColumn(0).getInt64() : std::int64_t{0};
+  });
+}
+
+absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>> Reader::Unnamed(
+    std::int64_t put_before_unix_s, int most) {
+  static const std::string kSome = absl::StrCat("SELECT digest, length(content) FROM blob WHERE ",
+                                                kUnnamed, " ORDER BY digest LIMIT ?");
+  return Guard([&] {
+    std::vector<std::pair<std::string, std::int64_t>> contents;
+    SQLite::Statement& row = connection_->Bind(kSome, put_before_unix_s, most);
+    while (row.executeStep()) {
+      contents.emplace_back(row.getColumn(0).getString(), row.getColumn(1).getInt64());
+    }
+    return contents;
+  });
+}
+
+absl::StatusOr<Reader::Upkeep> Reader::UpkeepOf() {
+  return Guard([&] {
+    const auto number = [this](const char* sql) {
+      return connection_->database().execAndGet(sql).getInt64();
+    };
+    return Upkeep{.leaving = static_cast<int>(number("SELECT count(*) FROM leaving")),
+                  .empty_bytes = number("PRAGMA freelist_count") * number("PRAGMA page_size"),
+                  .gives_back = number("PRAGMA auto_vacuum") != 0};
   });
 }
 

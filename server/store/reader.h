@@ -4,10 +4,12 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -28,6 +30,11 @@ class Reader {
   ~Reader();
 
   absl::StatusOr<std::vector<CampaignRecord>> Campaigns();
+  /// At most `most` of them, those with a larger id than `after`; most 0: all.
+  absl::StatusOr<std::vector<CampaignRecord>> Campaigns(std::int64_t after, int most);
+  /// Ids and texts of those with a larger id than `after` whose text has this word.
+  absl::StatusOr<std::vector<std::pair<std::int64_t, std::string>>> TextsWith(
+      const std::string& word, std::int64_t after);
   /// NOT_FOUND when there is none.
   absl::StatusOr<CampaignRecord> Campaign(std::int64_t id);
   /// Largest id ever given to a campaign, deleted ones included; 0 when there was none.
@@ -53,6 +60,8 @@ class Reader {
                                                   std::optional<int> sample = std::nullopt);
   /// The states of the samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<StateRecord>> StatesFrom(std::int64_t campaign, int first);
+  /// Of a campaign that was pruned: whether the states of this sample stay.
+  absl::StatusOr<bool> KeepsStates(std::int64_t campaign, int sample);
   /// An evaluation that ended with a result (finished or diverged) and was determined by the same
   /// things.
   absl::StatusOr<std::optional<EvaluationKey>> FindEqual(const std::string& digest);
@@ -76,6 +85,22 @@ class Reader {
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
   /// In the order in which they were last put.
   absl::StatusOr<std::vector<FindingRecord>> Findings(std::int64_t campaign);
+
+  /// Contents that nothing names and that were put before this moment, if at all, with their bytes;
+  /// at most so many.
+  absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>> Unnamed(
+      std::int64_t put_before_unix_s, int most);
+  /// What is to be tidied.
+  struct Upkeep {
+    int leaving = 0;               ///< campaigns of which something is on its way out
+    std::int64_t empty_bytes = 0;  ///< of the file
+    bool gives_back = false;       ///< those to the file system
+  };
+  absl::StatusOr<Upkeep> UpkeepOf();
+  /// A complete copy of what it sees, as CopyWhole() of whole_copy.h makes it.
+  absl::Status CopyTo(const std::string& path, const std::function<bool()>& goes_on);
+  /// When a backup was last taken whole; 0: never.
+  absl::StatusOr<std::int64_t> LastBackupUnixMs();
 
   /// Looks through the whole file, at most this long.
   struct FileCheck {

@@ -50,6 +50,13 @@ struct CampaignProgress {
 struct CampaignRecord {
   NewCampaign submitted{};
   CampaignProgress progress{};
+  std::optional<int> kept_states{};  ///< samples whose states it was pruned to; empty: it was not
+};
+
+/// A piece of what is removed.
+struct Removed {
+  int count = 0;      ///< rows, or pages of the file
+  bool more = false;  ///< something is left to be removed
 };
 
 struct IterationRecord {
@@ -124,6 +131,7 @@ enum class AttemptOutcome {
   kLost,         ///< nothing was heard of it any more
   kCancelled
 };
+inline constexpr std::size_t kAttemptOutcomes = 9;  ///< the last is kCancelled
 const char* ToString(AttemptOutcome outcome);
 
 /// A file of a program's scratch folder that stays with its run.
@@ -153,6 +161,9 @@ struct StateRecord {
   std::vector<double> observables{};
   std::string others{};  ///< JSON object of what a program told besides; empty: nothing
 };
+
+/// What the log of the server as a whole calls a backup that was taken whole.
+inline constexpr const char* kBackupEvent = "backup";
 
 struct EventRecord {
   std::int64_t unix_ms = 0;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <deque>
+#include <filesystem>
 #include <future>
 #include <iterator>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -59,6 +61,10 @@ class Store::Writer {
   void StopWaiting() {
     absl::MutexLock lock(&mutex_);
     waits_no_more_ = true;
+  }
+  StoreNumbers Numbers() {
+    absl::MutexLock lock(&mutex_);
+    return {.written = written_, .commits = commits_.Read(), .waiting = queue_.size()};
   }
 
  private:
@@ -169,6 +175,9 @@ class Store::Writer {
   enum class Refusing { kAll, kOne };
   absl::Status CommitAs(std::vector<Entry>& group, Refusing refusing) {
     const bool alone = refusing == Refusing::kOne;
+    const auto begun = std::chrono::steady_clock::now();
+    Tally written;
+    bool empties_log = false;
     try {
       const std::unique_ptr<SQLite::Transaction> scope = Begin();
       for (Entry& entry : group) {
@@ -181,6 +190,9 @@ class Store::Writer {
           entry.refused = transaction.status();
         } else if (!transaction.status().ok()) {
           return transaction.status();  // rolls back
+        } else {
+          written.Add(transaction.tally());
+          empties_log = empties_log || transaction.empties_log();
         }
         if (alone) connection_->Run("RELEASE job");
       }
@@ -191,10 +203,27 @@ class Store::Writer {
     } catch (const SQLite::Exception& error) {
       return connection_->StatusOf(error);
     }
+    commits_.Add(std::chrono::steady_clock::now() - begun);
+    {
+      absl::MutexLock lock(&mutex_);
+      written_.Add(written);
+    }
     if (hooks_.after_commit) {
       hooks_.after_commit();
     }
+    if (empties_log) {
+      EmptyLog();
+    }
     return absl::OkStatus();
+  }
+
+  /// As far as no reader needs it; waits for nobody.
+  void EmptyLog() {
+    try {
+      connection_->database().exec("PRAGMA wal_checkpoint(PASSIVE)");
+    } catch (const SQLite::Exception&) {
+      // what was committed is safe, and the next commits try again
+    }
   }
 
   const std::unique_ptr<Connection> connection_;  // the writer thread's alone
@@ -205,10 +234,27 @@ class Store::Writer {
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
   bool waits_no_more_ ABSL_GUARDED_BY(mutex_) = false;
   OnRoom on_room_ ABSL_GUARDED_BY(mutex_);
+  Tally written_ ABSL_GUARDED_BY(mutex_);
+  Durations commits_;
   std::thread thread_;  // last: starts when everything above is there
 };
 
 namespace {
+
+/// A file of an earlier program is written once more, so that its empty pages can go back to the
+/// file system. Where there is no room for that, they stay and are used again.
+absl::Status LearnToGiveBack(Connection& connection) {
+  try {
+    if (connection.database().execAndGet("PRAGMA auto_vacuum").getInt() == 0) {
+      connection.database().exec("PRAGMA auto_vacuum=INCREMENTAL");
+      connection.database().exec("VACUUM");
+    }
+    return absl::OkStatus();
+  } catch (const SQLite::Exception& error) {
+    const absl::Status status = connection.StatusOf(error);
+    return absl::IsResourceExhausted(status) ? absl::OkStatus() : status;
+  }
+}
 
 absl::Status At(const std::string& path, const absl::Status& status) {
   return {status.code(), absl::StrCat(path, ": ", status.message())};
@@ -224,6 +270,9 @@ absl::StatusOr<std::unique_ptr<Store>> Store::Open(const std::string& path, Stor
   }
   if (status.ok()) {
     status = Migrate(**connection);
+  }
+  if (status.ok()) {
+    status = LearnToGiveBack(**connection);
   }
   if (!status.ok()) {
     return At(path, status);
@@ -253,6 +302,18 @@ absl::Status Store::WriteNow(Job job) {
   std::promise<absl::Status> result;
   Write(std::move(job), [&result](const absl::Status& status) { result.set_value(status); });
   return result.get_future().get();
+}
+
+StoreNumbers Store::Numbers() const {
+  StoreNumbers numbers = writer_->Numbers();
+  const auto size = [](const std::string& path) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(path, error);
+    return error ? std::int64_t{0} : static_cast<std::int64_t>(bytes);
+  };
+  numbers.file_bytes = size(path_);
+  numbers.wal_bytes = size(path_ + "-wal");
+  return numbers;
 }
 
 absl::StatusOr<Reader> Store::Read() const {

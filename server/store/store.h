@@ -7,6 +7,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "server/store/numbers.h"
 #include "server/store/reader.h"
 #include "server/store/transaction.h"
 
@@ -63,6 +64,7 @@ class Store {
 
   const std::string& path() const { return path_; }
   absl::StatusOr<Reader> Read() const;
+  StoreNumbers Numbers() const;
 
  private:
   class Writer;

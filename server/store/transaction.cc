@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/store/blob_file.h"
 #include "server/store/connection.h"
+#include "server/store/removal.h"
 
 namespace calib::store {
 namespace {
@@ -20,6 +21,12 @@ bool IsAside(EvaluationStatus status) { return status == EvaluationStatus::kUnkn
 const char* StatusInTable(EvaluationStatus status) {
   return ToString(IsAside(status) ? EvaluationStatus::kFailed : status);
 }
+
+/// A content that was put stays for a while though nothing names it yet.
+constexpr const char* kHasBeenPut =
+    "INSERT INTO put(digest, unix_s) VALUES(?, CAST(strftime('%s', 'now') AS INTEGER)) "
+    "ON CONFLICT DO UPDATE SET unix_s = excluded.unix_s";
+constexpr const char* kIsNamed = "DELETE FROM put WHERE digest = ?";
 
 }  // namespace
 
@@ -45,18 +52,22 @@ void Transaction::PutBlob(const std::string& digest, const std::string& content)
     insert.bind(2, static_cast<const void*>(content.data()), static_cast<int>(content.size()));
     insert.exec();
     insert.reset();
+    connection_.Run(kHasBeenPut, digest);
   });
 }
 
 void Transaction::PutBlob(const std::string& digest, std::int64_t bytes, const Piece& piece) {
   Guard([&] {
-    if (connection_.Run("INSERT INTO blob(digest, content) VALUES(?, zeroblob(?)) "
-                        "ON CONFLICT DO NOTHING",
-                        digest, bytes) == 0) {
+    const bool is_new = connection_.Run(
+                            "INSERT INTO blob(digest, content) VALUES(?, zeroblob(?)) "
+                            "ON CONFLICT DO NOTHING",
+                            digest, bytes) > 0;
+    const std::int64_t row = connection_.database().getLastInsertRowid();
+    connection_.Run(kHasBeenPut, digest);
+    if (!is_new) {
       return;
     }
-    BlobFile blob(connection_.database(), connection_.database().getLastInsertRowid(),
-                  /*writable=*/true);
+    BlobFile blob(connection_.database(), row, /*writable=*/true);
     std::vector<char> buffer(static_cast<std::size_t>(std::min(bytes, kPieceBytes)));
     for (std::int64_t at = 0; at < bytes; at += kPieceBytes) {
       const std::span<char> part(buffer.data(),
@@ -99,6 +110,7 @@ void Transaction::InsertCampaign(const NewCampaign& campaign,
     for (const auto& [path, digest] : files) {
       connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
                       campaign.id, path, digest);
+      connection_.Run(kIsNamed, digest);
     }
   });
 }
@@ -121,7 +133,46 @@ void Transaction::Pause(std::int64_t campaign, const std::string& reason) {
 }
 
 void Transaction::DeleteCampaign(std::int64_t campaign) {
-  Guard([&] { connection_.Run("DELETE FROM campaign WHERE id = ?", campaign); });
+  Guard([&] {
+    connection_.Run(
+        "INSERT INTO leaving(campaign, whole) SELECT id, 1 FROM campaign WHERE id = ? "
+        "ON CONFLICT DO UPDATE SET whole = 1",
+        campaign);
+  });
+}
+
+bool Transaction::Prune(std::int64_t campaign, int kept) {
+  bool is_less = false;
+  Guard([&] {
+    is_less = connection_.Run(
+                  "INSERT INTO pruned(campaign, kept) SELECT id, ?2 FROM campaign WHERE id = ?1 "
+                  "AND id NOT IN (SELECT campaign FROM leaving WHERE whole) "
+                  "AND ?2 < (SELECT count(*) FROM sample WHERE campaign = ?1) "
+                  "ON CONFLICT DO UPDATE SET kept = excluded.kept WHERE excluded.kept < kept",
+                  campaign, kept) > 0;
+    if (is_less) {
+      connection_.Run("INSERT INTO leaving(campaign, whole) VALUES(?, 0) ON CONFLICT DO NOTHING",
+                      campaign);
+    }
+  });
+  return is_less;
+}
+
+Removed Transaction::Remove(int rows) {
+  Removed removed;
+  Guard([&] { removed = RemoveRows(connection_, rows); });
+  return removed;
+}
+
+void Transaction::RemoveBlob(const std::string& digest, std::int64_t put_before_unix_s) {
+  Guard([&] { RemoveUnnamed(connection_, digest, put_before_unix_s); });
+}
+
+Removed Transaction::ReturnPages(int pages) {
+  Removed returned;
+  Guard([&] { returned = store::ReturnPages(connection_, pages); });
+  empties_log_ = returned.count > 0 && !returned.more;
+  return returned;
 }
 
 void Transaction::InsertIteration(std::int64_t campaign, int number, const std::string& proposal) {
@@ -245,24 +296,29 @@ void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest)
 }
 
 void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to) {
+  // It may have been deleted or pruned since.
+  static const std::string kFrom =
+      absl::StrCat("WHERE campaign = ? AND sample = ? AND experiment = ? AND ", kStaysWhole);
+  static const std::string kOutcome = absl::StrCat(
+      "UPDATE evaluation SET (status, reason, reused) = (SELECT status, reason, 1 "
+      "FROM evaluation WHERE campaign = ? AND sample = ? AND experiment = ?) "
+      "WHERE campaign = ? AND sample = ? AND experiment = ? AND EXISTS (SELECT 1 FROM evaluation ",
+      kFrom, ")");
+  static const std::string kStates = absl::StrCat(
+      "INSERT INTO state(campaign, sample, experiment, load_step, observables, others) "
+      "SELECT ?, ?, ?, load_step, observables, others FROM state ",
+      kFrom, " ON CONFLICT DO NOTHING");
+  static const std::string kFiles = absl::StrCat(
+      "INSERT INTO kept(campaign, sample, experiment, name, digest, reason) "
+      "SELECT ?, ?, ?, name, digest, reason FROM kept ",
+      kFrom, " ON CONFLICT DO NOTHING");
   Guard([&] {
-    connection_.Run(
-        "UPDATE evaluation SET (status, reason, reused) = (SELECT status, reason, 1 "
-        "FROM evaluation WHERE campaign = ? AND sample = ? AND experiment = ?) "
-        "WHERE campaign = ? AND sample = ? AND experiment = ? AND EXISTS (SELECT 1 FROM evaluation "
-        "WHERE campaign = ? AND sample = ? AND experiment = ?)",  // it may have been deleted since
-        from.campaign, from.sample, from.experiment, to.campaign, to.sample, to.experiment,
-        from.campaign, from.sample, from.experiment);
-    connection_.Run(
-        "INSERT INTO state(campaign, sample, experiment, load_step, observables, others) "
-        "SELECT ?, ?, ?, load_step, observables, others FROM state "
-        "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
-        to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
-    connection_.Run(
-        "INSERT INTO kept(campaign, sample, experiment, name, digest, reason) "
-        "SELECT ?, ?, ?, name, digest, reason FROM kept "
-        "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
-        to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
+    connection_.Run(kOutcome, from.campaign, from.sample, from.experiment, to.campaign, to.sample,
+                    to.experiment, from.campaign, from.sample, from.experiment);
+    for (const std::string* copy : {&kStates, &kFiles}) {
+      connection_.Run(*copy, to.campaign, to.sample, to.experiment, from.campaign, from.sample,
+                      from.experiment);
+    }
   });
 }
 
@@ -283,6 +339,7 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
         "contact_updates = ?, core_seconds = ?, staging = ?, words = ? WHERE id = ?",
         end.ended_unix_ms, ToString(end.outcome), end.reason, end.steps, end.contact_updates,
         end.core_seconds, end.staging, end.words, end.id);
+    ++tally_.ended[static_cast<std::size_t>(end.outcome)];
     for (const KeptFile& file : end.kept) {
       connection_.Run(
           "INSERT INTO kept(campaign, sample, experiment, name, digest, reason) "
@@ -290,16 +347,18 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
           "FROM attempt WHERE id = ? "
           "ON CONFLICT DO UPDATE SET digest = excluded.digest, reason = excluded.reason",
           file.name, file.digest, file.reason, end.id);
+      connection_.Run(kIsNamed, file.digest);
     }
   });
 }
 
 void Transaction::EndOpenAttempts(std::int64_t campaign, const AttemptEnd& end) {
   Guard([&] {
-    connection_.Run(
+    const int ended = connection_.Run(
         "UPDATE attempt SET ended_unix_ms = ?, outcome = ?, reason = ? "
         "WHERE campaign = ? AND outcome IS NULL",
         end.ended_unix_ms, ToString(end.outcome), end.reason, campaign);
+    tally_.ended[static_cast<std::size_t>(end.outcome)] += static_cast<std::uint64_t>(ended);
   });
 }
 
@@ -319,6 +378,7 @@ void Transaction::PutState(const StateRecord& state, std::int64_t unix_ms) {
         "VALUES(?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
         key.campaign, key.sample, key.experiment, state.load_step, blob, state.others);
     if (inserted > 0) {
+      ++tally_.states;
       return;
     }
     SQLite::Statement& same = connection_.Bind(
@@ -344,6 +404,7 @@ void Transaction::PutFinding(std::int64_t campaign, const FindingRecord& finding
         "WHERE campaign.id = ? AND blob.digest = ? "
         "ON CONFLICT DO UPDATE SET id = 1 + (SELECT max(id) FROM finding)",
         finding.kind, finding.created_unix_ms, campaign, finding.digest);
+    connection_.Run(kIsNamed, finding.digest);
   });
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "server/store/numbers.h"
 #include "server/store/records.h"
 
 namespace calib::store {
@@ -27,6 +28,10 @@ class Transaction {
   Transaction& operator=(const Transaction&) = delete;
 
   const absl::Status& status() const { return status_; }
+  /// Whether what is in the log beside the file is to be brought into it after the commit.
+  bool empties_log() const { return empties_log_; }
+  /// What has been written so far.
+  const Tally& tally() const { return tally_; }
 
   /// Content under its digest; a second copy changes nothing.
   void PutBlob(const std::string& digest, const std::string& content);
@@ -44,8 +49,19 @@ class Transaction {
   void Pause(std::int64_t campaign, const std::string& reason);
   /// Requests that were given this answer are new again.
   void ForgetRequests(const std::string& answer);
-  /// Deletes the campaign with everything that belongs to it; blobs stay.
+  /// From now on nobody sees the campaign; what belongs to it leaves by Remove().
   void DeleteCampaign(std::int64_t campaign);
+  /// From now on a campaign that is over has the states of the samples of largest weight alone, so
+  /// many or as few as it was pruned to before; the others leave by Remove(). Whether that is less
+  /// than it had.
+  bool Prune(std::int64_t campaign, int kept);
+  /// Removes at most so many rows of what leaves.
+  Removed Remove(int rows);
+  /// Removes a content that nothing names and that was put before this moment, if at all.
+  void RemoveBlob(const std::string& digest, std::int64_t put_before_unix_s);
+  /// Gives at most so many empty pages of the file back to the file system; with the last ones the
+  /// file becomes smaller.
+  Removed ReturnPages(int pages);
 
   void InsertIteration(std::int64_t campaign, int number, const std::string& proposal);
   /// Replaces the proposal of an iteration that goes on growing.
@@ -84,6 +100,9 @@ class Transaction {
   /// with its first date. Changes nothing where one of them is gone.
   void PutFinding(std::int64_t campaign, const FindingRecord& finding);
 
+  /// A backup was taken whole.
+  void LogBackup(std::int64_t unix_ms) { Log(0, unix_ms, kBackupEvent); }
+
   /// campaign 0: concerns the server as a whole.
   void Log(std::int64_t campaign, std::int64_t unix_ms, const std::string& what);
 
@@ -94,6 +113,8 @@ class Transaction {
 
   Connection& connection_;
   absl::Status status_;
+  Tally tally_;
+  bool empties_log_ = false;
 };
 
 }  // namespace calib::store

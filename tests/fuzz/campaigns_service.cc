@@ -100,6 +100,9 @@ const std::vector<Entry>& Entries() {
       {{"DrainWorker", Default<v1::DrainRequest>()}, Unary(&S::DrainWorker)},
       {{"Examine", Default<v1::ExamineRequest>()}, Unary(&S::Examine)},
       {{"AddRuns", Default<v1::AddRunsRequest>()}, Unary(&S::AddRuns)},
+      {{"GetMetrics", Default<v1::MetricsRequest>()}, Unary(&S::GetMetrics)},
+      {{"Prune", Default<v1::PruneRequest>()}, Unary(&S::Prune)},
+      {{"Backup", Default<v1::BackupRequest>()}, Stream(&S::Backup)},
   };
   return entries;
 }

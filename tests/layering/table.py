@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     program < engine < .
 server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < scheduler < { service report/documents } < client < { page diagnosis inspection } < { ctl/shell ctl/slurm } < ctl < ctl/verbs < .
+           < scheduler < service/upkeep < { service report/documents } < client < { page diagnosis inspection } < { ctl/shell ctl/slurm } < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
@@ -33,7 +33,7 @@ server/messages   | dem proto/calib proto/rpc server/campaign                   
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
 server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
 server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
-server            | proto/rpc server/store server/scheduler server/service server/client server/page | spdlog CLI chrono
+server            | proto/rpc server/messages server/store server/scheduler server/service server/client server/page | spdlog CLI chrono
 server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
 server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp nlohmann chrono
 server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono

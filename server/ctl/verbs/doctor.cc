@@ -111,6 +111,7 @@ absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Ch
   }
   checks.push_back(JudgeFolder(server.state_folder(), FolderUse::kState));
   checks.push_back(JudgeDatabase(server));
+  for (Check& check : JudgeUpkeep(server)) checks.push_back(std::move(check));
   if (auto waiting = JudgeWaiting(server); waiting.has_value()) {
     checks.push_back(*std::move(waiting));
   }

@@ -45,8 +45,8 @@ void Declare(OptionList& list, ListOptions& options) {
 
 absl::StatusOr<int> List(const CommonOptions& common, const ListOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
-  ASSIGN_OR_RETURN(const auto campaigns, client::List(session->client(), {.limit = options.limit,
-                                                                          .after = options.after}));
+  ASSIGN_OR_RETURN(const auto campaigns,
+                   session->client().List({.limit = options.limit, .after = options.after}));
   if (common.json) {
     std::cout << report::StatusListJson(campaigns);
     return kDone;

@@ -31,19 +31,18 @@ std::string Clock(std::int64_t unix_ms) {
                      local.tm_mday, local.tm_hour, local.tm_min, local.tm_sec);
 }
 
-std::string Named(const std::string& campaign, const std::vector<v1::CampaignStatus>& campaigns) {
-  for (const v1::CampaignStatus& other : campaigns) {
-    if (other.campaign() == campaign) return campaign + " (" + other.name() + ")";
-  }
-  return campaign + ", which has been deleted";
+std::string Named(const std::string& campaign, const absl::StatusOr<v1::CampaignStatus>& status) {
+  return status.ok() ? campaign + " (" + status->name() + ")"
+                     : campaign + ", which has been deleted";
 }
 
 // Parent and children, extensions by name, trials of diagnose by their number.
 std::string Family(const v1::CampaignStatus& status,
+                   const absl::StatusOr<v1::CampaignStatus>& parent,
                    const std::vector<v1::CampaignStatus>& campaigns) {
   std::string text;
   if (!status.parent().empty()) {
-    text += fmt::format("Made from {} as {}.\n", Named(status.parent(), campaigns),
+    text += fmt::format("Made from {} as {}.\n", Named(status.parent(), parent),
                         status.purpose().empty() ? "a derived campaign" : status.purpose());
   }
   std::vector<v1::CampaignStatus> trials;
@@ -82,12 +81,17 @@ absl::StatusOr<int> Show(const CommonOptions& common, const ShowOptions& options
     return kDone;
   }
   ASSIGN_OR_RETURN(const auto status, client.Show(options.campaign));
-  ASSIGN_OR_RETURN(const auto campaigns, client.List());
+  ASSIGN_OR_RETURN(const auto campaigns, client.List({.parent = options.campaign}));
+  absl::StatusOr<v1::CampaignStatus> parent;
+  if (!status.parent().empty()) parent = client.Show(status.parent());
+  if (!parent.ok() && !absl::IsNotFound(parent.status()) && !status.parent().empty()) {
+    return parent.status();
+  }
   ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
   ASSIGN_OR_RETURN(const auto warnings, client::WarningsOf(client, options.campaign));
   std::cout << StatusText(status);
   for (const std::string& warning : warnings) std::cout << report::Wrapped(warning, "! ", "  ");
-  std::cout << Family(status, campaigns) << Concluded(findings);
+  std::cout << Family(status, parent, campaigns) << Concluded(findings);
   ASSIGN_OR_RETURN(const auto log, client.GetLog(options.campaign));
   constexpr std::size_t kShown = 10;
   const std::size_t first = log.size() > kShown ? log.size() - kShown : 0;

@@ -35,7 +35,7 @@ TEST_F(LivePageTest, WantsTheTokenOnceAndThenItsCookie) {
   // It opens the page, not the server.
   Write("cookie", set.substr(set.find('=') + 1, kTokenDigits) + "\n");
   EXPECT_THAT(Refused("list", "--token cookie"), HasSubstr("the token is not this server's"));
-  for (const char* open : {"/healthz", "/readyz"}) {
+  for (const char* open : {"/healthz", "/readyz", "/metrics"}) {
     EXPECT_EQ(Fetch(http_, open).status, 200) << open;
   }
   EXPECT_THAT(Read("state.log") + Read("state.err"), Not(HasSubstr(token_)));
@@ -52,6 +52,27 @@ TEST_F(LivePageTest, EveryAnswerCarriesItsPolicy) {
       EXPECT_EQ(reply.status == 405, std::string(method) == "POST") << target;
     }
   }
+}
+
+TEST_F(LivePageTest, MetricsAreOpenAndCountWhatTheServerDoes) {
+  const auto server = ServeWithPage("state", {});
+  SubmitAndFinish();
+  const HttpReply reply = Fetch(http_, "/metrics");
+  ASSERT_EQ(reply.status, 200) << reply.body;
+  EXPECT_EQ(reply.headers.at("content-type"), "text/plain; version=0.0.4; charset=utf-8");
+  EXPECT_THAT(reply.headers.at("content-security-policy"), HasSubstr("default-src 'none'"));
+  for (const char* line :
+       {"calib_campaigns 0\n", "calib_queue_evaluations 0\n", "calib_store_waits 0\n",
+        "calib_lease_expiries_total 0\n", "calib_workers{state=\"connected\"} ",
+        "# TYPE calib_ack_seconds histogram\n", "calib_commit_seconds_bucket{le=\"+Inf\"} ",
+        "calib_strand_lag_seconds_count ", "calib_wal_bytes "}) {
+    EXPECT_THAT(reply.body, HasSubstr(line));
+  }
+  EXPECT_THAT(reply.body, Not(HasSubstr("calib_runs_total{end=\"completed\"} 0\n")));
+  EXPECT_THAT(reply.body, Not(HasSubstr("calib_states_total 0\n")));
+  EXPECT_EQ(Fetch(http_, "/metrics", {}, "HEAD").status, 200);
+  EXPECT_EQ(Fetch(http_, "/metrics", {}, "POST").status, 405);
+  EXPECT_EQ(Fetch(http_, "/metrics", {"Host: evil.example"}).status, 403);
 }
 
 TEST_F(LivePageTest, AnotherNameThatLeadsHereIsRefused) {

@@ -214,6 +214,30 @@ TEST(Doctor, ADamagedFileIsAProblem) {
   EXPECT_EQ(JudgeDatabase(server).health, Health::kProblem);
 }
 
+TEST(Doctor, SizeAndBackupsOfAServer) {
+  constexpr std::int64_t kGib = std::int64_t{1} << 30;
+  constexpr std::int64_t kDayMs = 86'400'000;
+  v1::ServerReport server;
+  server.set_unix_ms(1000 * kDayMs);
+  server.set_database_bytes(5 * kGib);
+  auto checks = JudgeUpkeep(server);
+  ASSERT_EQ(checks.size(), 2U);
+  EXPECT_EQ(checks[0].health, Health::kOk);
+  EXPECT_EQ(checks[1].health, Health::kOk);
+  EXPECT_THAT(checks[1].found, HasSubstr("None was taken"));
+  server.set_database_free_bytes(4 * kGib);
+  EXPECT_EQ(JudgeUpkeep(server)[0].health, Health::kWarning);
+  server.set_leaving(2);
+  EXPECT_EQ(JudgeUpkeep(server)[0].health, Health::kOk) << "it is being removed";
+  EXPECT_THAT(JudgeUpkeep(server)[0].found, HasSubstr("2 campaigns have left behind"));
+  server.set_wal_bytes(kGib);
+  EXPECT_EQ(JudgeUpkeep(server)[0].health, Health::kWarning);
+  server.set_last_backup_unix_ms(998 * kDayMs);
+  EXPECT_EQ(JudgeUpkeep(server)[1].health, Health::kOk);
+  server.set_last_backup_unix_ms(900 * kDayMs);
+  EXPECT_EQ(JudgeUpkeep(server)[1].health, Health::kWarning);
+}
+
 TEST(Doctor, TextAndJsonSayTheSame) {
   const std::vector<Check> checks = {
       {.name = "file_system", .subject = "state folder", .found = "Fine."},

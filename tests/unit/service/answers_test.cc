@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "proto/rpc/check_message.h"
+#include "server/campaign/file/text/origin.h"
 #include "server/campaign/model/sha256.h"
 #include "server/scheduler/posterior_record.h"
 #include "server/service/calls.h"
@@ -77,7 +80,7 @@ TEST_F(Answers, OneUnreadablePosteriorIsSaidOfItsCampaignAndTheOthersAreListed) 
   AddCampaign(2, "{\"best_misfit\": tw");
   AddCampaign(3, Posterior(std::numeric_limits<double>::quiet_NaN()));
   store::Reader reader = Read();
-  const auto list = Outgoing(ListOf(reader, {}));
+  const auto list = Outgoing(ListOf(reader, *reader.Campaigns(), {}));
   ASSERT_TRUE(list.ok()) << list.status();
   ASSERT_EQ(list->campaigns_size(), 3);
   EXPECT_EQ(list->campaigns(0).problem(), "");
@@ -87,6 +90,58 @@ TEST_F(Answers, OneUnreadablePosteriorIsSaidOfItsCampaignAndTheOthersAreListed) 
   EXPECT_EQ(list->campaigns(1).name(), "sand");
   EXPECT_EQ(list->campaigns(1).samples(), 2);
   EXPECT_EQ(list->campaigns(2).problem(), "");
+}
+
+// Of most texts two keys alone are read; of those that may mean something else all of them.
+TEST_F(Answers, ATextTellsItsOriginHoweverItIsWritten) {
+  const std::string model = "model:\n  contact: linear\n  effects:\n  - rolling_resistance\n";
+  const std::string lineage = "lineage:\n  parent: c7\n\n  # by diagnose\n  purpose: extension\n";
+  const std::string rest = "name: sand\nparameters:\n  model_like: {min: 1}\n";
+  for (const std::string& text :
+       {rest + model + lineage, lineage + rest + model, model + "seed: 2\n" + lineage + rest,
+        "note: 90 %\n" + rest + lineage + model,
+        std::string("\"lineage\": {parent: c7, purpose: extension}\n") + model,
+        std::string("{model: {effects: [rolling_resistance]},\n"
+                    "lineage: {parent: c7, purpose: extension}}\n"),
+        std::string("model: {effects: rolling_resistance}\nlineage: {parent: c7,\n"
+                    "  purpose: extension\n}\nseed: 3\n")}) {
+    const campaign::Origin origin = campaign::OriginOf(text);
+    EXPECT_EQ(origin.parent, "c7") << text;
+    EXPECT_EQ(origin.purpose, "extension") << text;
+    EXPECT_EQ(origin.effects, std::vector<std::string>{"rolling_resistance"}) << text;
+  }
+  EXPECT_EQ(campaign::OriginOf(rest + model).parent, "");
+}
+
+TEST_F(Answers, ListsComeByPagesAndByWhatTheyComeFrom) {
+  for (const std::int64_t id : {1, 2, 3, 5}) AddCampaign(id, Posterior(2));
+  campaign_.yaml += "lineage: {parent: c2, purpose: extension}\n";
+  for (const std::int64_t id : {6, 7}) AddCampaign(id, Posterior(2));
+  Descent descent;
+  const auto ids = [&](int limit, const std::string& after, const std::string& parent = "") {
+    v1::ListRequest request;
+    request.set_limit(limit);
+    request.set_after(after);
+    request.set_parent(parent);
+    store::Reader reader = Read();
+    std::string text;
+    const auto asked = Asked(reader, request, descent);
+    if (!asked.ok()) return std::string(asked.status().message());
+    for (const auto& record : *asked) text += std::to_string(record.submitted.id) + " ";
+    return text;
+  };
+  EXPECT_EQ(ids(0, ""), "1 2 3 5 6 7 ");
+  EXPECT_EQ(ids(2, ""), "1 2 ");
+  EXPECT_EQ(ids(2, "c2"), "3 5 ");
+  EXPECT_EQ(ids(3, "c4"), "5 6 7 ") << "one that was deleted since the page before";
+  EXPECT_EQ(ids(3, "c7"), "");
+  EXPECT_EQ(ids(3, "c8"), "there is no campaign \"c8\"");
+  EXPECT_EQ(ids(0, "", "c2"), "6 7 ");
+  EXPECT_EQ(ids(1, "c6", "c2"), "7 ");
+  AddCampaign(8, Posterior(2));
+  Write([](store::Transaction& t) { t.DeleteCampaign(7); });
+  EXPECT_EQ(ids(0, "", "c2"), "6 8 ");
+  EXPECT_EQ(ids(0, "", "c1"), "");
 }
 
 // What has finished is counted once; a batch that is added to a design is counted too.
@@ -106,7 +161,7 @@ TEST_F(Answers, WhatHasFinishedIsKnownUntilItGoesOn) {
   const auto again = StatusOf(later, 1, std::nullopt, "disk full", &finished);
   EXPECT_EQ(again->server_waits(), "disk full");
   EXPECT_EQ(again->best_misfit(), first->best_misfit());
-  const auto list = ListOf(later, {}, "", &finished);
+  const auto list = ListOf(later, *later.Campaigns(), {}, "", &finished);
   EXPECT_EQ(list->campaigns(0).SerializeAsString(), first->SerializeAsString());
   Write([](store::Transaction& t) {
     t.SetProgress(1, {.state = store::CampaignState::kFinished, .iteration = 1});
@@ -127,7 +182,7 @@ TEST_F(Answers, AReasonOfMegabytesOfAnEarlierProgramIsCut) {
   ASSERT_TRUE(status.ok()) << status.status();
   EXPECT_LT(status->reason().size(), 10'000U);
   EXPECT_EQ(status->name(), "sand?of two lines");
-  EXPECT_TRUE(Outgoing(ListOf(reader, {})).ok());
+  EXPECT_TRUE(Outgoing(ListOf(reader, *reader.Campaigns(), {})).ok());
   EXPECT_LT(Outgoing(absl::StatusOr<v1::LogEntry>((*LogOf(reader, 1))[0]))->what().size(), 10'000U);
 }
 

@@ -122,7 +122,10 @@ TEST_F(StoreTest, FilesOfAProgramStayWithTheirRunAndWithWhatReusesIt) {
   EXPECT_EQ(files[2].second.digest, "") << "of a content that nobody has";
   Write([&](Transaction& t) { t.BeginAnew(kKey, "e"); });
   EXPECT_EQ(Read().KeptBySample(1)->at(0).size(), 3U);
-  Write([&](Transaction& t) { t.DeleteCampaign(1); });
+  Write([&](Transaction& t) {
+    t.DeleteCampaign(1);
+    t.Remove(1000);
+  });
   EXPECT_TRUE(Read().KeptBySample(1)->empty());
 }
 
@@ -218,7 +221,10 @@ TEST_F(StoreTest, AttemptNumbersAreNeverUsedAgain) {
   EXPECT_TRUE(Read().ActiveAttempts()->empty());
   EXPECT_EQ(Read().EffortOf(1)->model_evaluations, 1);
   EXPECT_EQ(Read().EffortOf(1)->core_seconds, 2.5);
-  Write([](Transaction& t) { t.DeleteCampaign(1); });
+  Write([](Transaction& t) {
+    t.DeleteCampaign(1);
+    t.Remove(1000);
+  });
   EXPECT_EQ(*Read().LastAttempt(), 5);
   EXPECT_EQ(*Read().LastCampaign(), 1);
   EXPECT_TRUE(Read().States(1)->empty());
@@ -400,7 +406,10 @@ TEST_F(StoreTest, FindingsAreKeptOnceAndGoWithTheirCampaign) {
   EXPECT_EQ((*findings)[0].kind, "diagnosis");
   EXPECT_EQ((*findings)[0].created_unix_ms, 5);
   EXPECT_EQ((*findings)[1].kind, "improvement");
-  Write([](Transaction& t) { t.DeleteCampaign(1); });
+  Write([](Transaction& t) {
+    t.DeleteCampaign(1);
+    t.Remove(1000);
+  });
   EXPECT_TRUE(Read().Findings(1)->empty());
 }
 
