@@ -122,14 +122,16 @@ grpc::ServerWriteReactor<v1::BlobChunk>* CampaignsService::Backup(
   auto under_way = std::make_shared<UnderWay>(backs_up_);
   return new StreamReactor<v1::BlobChunk>(
       core_, std::move(entry->pass), &Core::LookAfter,
-      [this, under_way, caller = entry->caller]() -> absl::StatusOr<std::vector<v1::BlobChunk>> {
+      [this, under_way, context,
+       caller = entry->caller]() -> absl::StatusOr<std::vector<v1::BlobChunk>> {
         std::vector<v1::BlobChunk> chunks;
         if (under_way->all_sent) return chunks;
         auto& copy = under_way->copy;
         if (copy == nullptr) {
           ASSIGN_OR_RETURN(auto reader, core_.Read());
-          ASSIGN_OR_RETURN(
-              copy, BackupCopy::Make(reader, site_.state_folder, [this] { return !core_.ends(); }));
+          ASSIGN_OR_RETURN(copy, BackupCopy::Make(reader, site_.state_folder, [this, context] {
+                             return !core_.ends() && !context->IsCancelled();
+                           }));
           chunks.emplace_back().set_digest(copy->digest());
         } else {
           chunks.emplace_back();
