@@ -642,7 +642,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
       },
       [this, attempt, session = worker.session, name = worker.hello.name(),
        message = std::move(message)](const absl::Status& status) {
-        if (status.ok() && leases_.Find(attempt, name) != nullptr) {
+        // It is named from when it is sent: until now nobody could.
+        if (status.ok() && leases_.Named(attempt, name, ports_.Now())) {
           ports_.Send(session, message);
         }
       });

@@ -3,6 +3,14 @@
 #include <algorithm>
 
 namespace calib::scheduler {
+namespace {
+
+/// Lease times in which a worker names what it works on. chosen: what lies in the queues of a
+/// server that is late by a lease time in both directions has come and gone by then
+constexpr int kUnnamedLeases = 4;
+
+}  // namespace
+
 void LeaseTable::Grant(LeaseEntry lease) {
   lease.named = lease.started;
   const auto [holder, is_new] = of_worker_.try_emplace(lease.worker);
@@ -91,7 +99,7 @@ std::vector<LeaseEntry> LeaseTable::Unnamed(const std::string& worker,
   }
   for (const std::int64_t attempt : holder->second.attempts) {
     const LeaseEntry& lease = leases_.at(attempt);
-    if (std::max(lease.named, pardoned_) + lease_ < now) {
+    if (std::max(lease.named, pardoned_) + kUnnamedLeases * lease_ < now) {
       unnamed.push_back(lease);
     }
   }

@@ -52,7 +52,7 @@ class LeaseTable {
   /// Those whose worker was not heard for a lease time before `now`, nor granted them within it, in
   /// order of attempt; they are still held.
   std::vector<LeaseEntry> Expired(Clock::time_point now);
-  /// Those of a worker that it has not named for that long.
+  /// Those of a worker that it has not named for four lease times.
   std::vector<LeaseEntry> Unnamed(const std::string& worker, Clock::time_point now) const;
 
   /// In order of attempt, as below.

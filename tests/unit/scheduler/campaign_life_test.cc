@@ -76,7 +76,7 @@ TEST(CampaignLife, AnyWordOfAWorkerKeepsAllThatItWorksOn) {
   EXPECT_EQ(service.Read().States(1)->size(), 4U);
 }
 
-TEST(CampaignLife, WhatAWorkerDoesNotNameForALeaseTimeGoesToAnother) {
+TEST(CampaignLife, WhatAWorkerDoesNotNameForFourLeaseTimesGoesToAnother) {
   SimulatedService service("unnamed");
   service.Submit(Small());
   const std::int64_t worker = service.Connect("w", 2);
@@ -84,7 +84,7 @@ TEST(CampaignLife, WhatAWorkerDoesNotNameForALeaseTimeGoesToAnother) {
   const v1::Lease unknown = service.Next(worker, Kind::kLease).lease();
   v1::Heartbeat heartbeat;
   heartbeat.add_attempts(known.attempt());
-  for (int beat = 0; beat < 3; ++beat) {
+  for (int beat = 0; beat < 9; ++beat) {
     service.Advance(milliseconds(500));
     EXPECT_TRUE(service.scheduler().Receive(worker, heartbeat).ok());
     service.ports().Run();

@@ -76,8 +76,8 @@ TEST(LeaseTable, WhoIsHeardKeepsAllThatItHoldsButWhatItNeverNames) {
     EXPECT_TRUE(table.Named(7, "w", kStart + seconds(t)));
     EXPECT_TRUE(table.Expired(kStart + seconds(t)).empty());
   }
-  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(10)).empty());
-  const auto unnamed = table.Unnamed("w", kStart + seconds(11));
+  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(40)).empty());
+  const auto unnamed = table.Unnamed("w", kStart + seconds(41));
   ASSERT_EQ(unnamed.size(), 1U);
   EXPECT_EQ(unnamed.front().attempt, 8);
 }
@@ -101,9 +101,9 @@ TEST(LeaseTable, AfterAStandstillNothingEndsForALeaseTime) {
   table.Grant(Lease(7, "w"));
   table.Pardon(kStart + seconds(100));
   EXPECT_TRUE(table.Expired(kStart + seconds(110)).empty());
-  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(110)).empty());
+  EXPECT_TRUE(table.Unnamed("w", kStart + seconds(140)).empty());
   EXPECT_LE(table.HeardSince(kStart + seconds(109)), kStart) << "nobody is silent yet";
-  EXPECT_EQ(table.Unnamed("w", kStart + seconds(111)).size(), 1U);
+  EXPECT_EQ(table.Unnamed("w", kStart + seconds(141)).size(), 1U);
   EXPECT_EQ(table.Expired(kStart + seconds(111)).size(), 1U);
 }
 
