@@ -36,17 +36,25 @@ void HeldAttempt::AddEnd(v1::Finished finished) {
   end_ = std::move(finished);
 }
 
-std::vector<v1::WorkerMessage> HeldAttempt::TakeUnsent() {
-  std::vector<v1::WorkerMessage> messages;
+std::vector<v1::StateBatch> HeldAttempt::TakeUnsentStates() {
+  std::vector<v1::StateBatch> batches;
   const std::int64_t end = first_ + static_cast<std::int64_t>(kept_.size());
   while (next_ < end) {
-    v1::StateBatch& batch = *messages.emplace_back().mutable_states();
+    v1::StateBatch& batch = batches.emplace_back();
     batch.set_attempt(lease_.attempt());
     batch.set_first(next_);
     const std::int64_t stop = std::min(end, next_ + kStatesPerBatch);
     for (; next_ < stop; ++next_) {
       *batch.add_states() = kept_[static_cast<std::size_t>(next_ - first_)];
     }
+  }
+  return batches;
+}
+
+std::vector<v1::WorkerMessage> HeldAttempt::TakeUnsent() {
+  std::vector<v1::WorkerMessage> messages;
+  for (v1::StateBatch& batch : TakeUnsentStates()) {
+    *messages.emplace_back().mutable_states() = std::move(batch);
   }
   if (end_.has_value() && !end_sent_) {
     *messages.emplace_back().mutable_finished() = *end_;

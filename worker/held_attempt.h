@@ -38,6 +38,8 @@ class HeldAttempt {
   void AddState(v1::State state);
   void AddEnd(v1::Finished finished);
 
+  /// States not yet sent over the present stream, in batches.
+  std::vector<v1::StateBatch> TakeUnsentStates();
   /// Messages not yet sent over the present stream: batches of states, then the end.
   std::vector<v1::WorkerMessage> TakeUnsent();
   /// A new stream knows nothing: everything that is not acknowledged is unsent again.

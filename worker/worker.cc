@@ -31,6 +31,9 @@ namespace asio = boost::asio;
 
 constexpr char kLeaving[] = "the worker is leaving";
 
+/// A state has some ten numbers: far below the limit of a message.
+constexpr int kStatesPerMessage = 1000;
+
 /// After these the server would say the same again.
 bool IsFinal(const absl::Status& status) {
   return absl::IsPermissionDenied(status) ||
@@ -50,6 +53,7 @@ class Worker::Impl {
         heartbeat_(io_),
         reconnect_(io_),
         farewell_(io_),
+        gather_(io_),
         link_(options_.server, options_.access,
               {.received =
                    [this](v1::ServerMessage message) {
@@ -192,6 +196,11 @@ class Worker::Impl {
       case v1::ServerMessage::kAck:
         Acknowledged(message.ack());
         break;
+      case v1::ServerMessage::kAcks:
+        for (const v1::Ack& ack : message.acks().acks()) {
+          Acknowledged(ack);
+        }
+        break;
       case v1::ServerMessage::kStop:
         spdlog::info("stop attempt={}", message.stop().attempt());
         Drop(message.stop().attempt());
@@ -243,6 +252,7 @@ class Worker::Impl {
     said_why_ = false;
     backoff_.Reset();
     heartbeat_every_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms()));
+    gather_for_ = std::chrono::milliseconds(welcome.gather_ms());
     for (auto& [id, attempt] : held_) {
       Send(attempt);
     }
@@ -269,6 +279,30 @@ class Worker::Impl {
       for (v1::WorkerMessage& message : attempt.TakeUnsent()) {
         link_.Send(std::move(message));
       }
+    }
+  }
+
+  /// Of all attempts what has gathered.
+  void SendGathered() {
+    gather_.cancel();
+    gathers_ = false;
+    if (!welcome_) {
+      return;  // it goes with the next Welcome
+    }
+    v1::WorkerMessage message;
+    int states = 0;
+    for (auto& [id, attempt] : held_) {
+      for (v1::StateBatch& batch : attempt.TakeUnsentStates()) {
+        if (states > 0 && states + batch.states_size() > kStatesPerMessage) {
+          link_.Send(std::exchange(message, {}));
+          states = 0;
+        }
+        states += batch.states_size();
+        *message.mutable_gathered()->add_batches() = std::move(batch);
+      }
+    }
+    if (states > 0) {
+      link_.Send(std::move(message));
     }
   }
 
@@ -320,7 +354,16 @@ class Worker::Impl {
   void Reached(std::int64_t id, const v1::State& state) {
     if (const auto found = held_.find(id); found != held_.end()) {
       found->second.AddState(state);
-      Send(found->second);
+      if (gather_for_.count() == 0) {
+        Send(found->second);
+      } else if (!std::exchange(gathers_, true)) {
+        gather_.expires_after(gather_for_);
+        gather_.async_wait([this](const boost::system::error_code& error) {
+          if (!error) {
+            SendGathered();
+          }
+        });
+      }
     }
   }
 
@@ -330,6 +373,9 @@ class Worker::Impl {
                  finished.core_seconds(), finished.reason());
     if (const auto found = held_.find(id); found != held_.end()) {
       found->second.AddEnd(finished);
+      if (gathers_) {
+        SendGathered();  // the end comes last
+      }
       Send(found->second);
     } else {
       ending_.erase(id);  // joins the thread, which has nothing left to do
@@ -466,6 +512,7 @@ class Worker::Impl {
     heartbeat_.cancel();
     reconnect_.cancel();
     farewell_.cancel();
+    gather_.cancel();
     io_.stop();
   }
 
@@ -476,14 +523,17 @@ class Worker::Impl {
   asio::steady_timer heartbeat_;
   asio::steady_timer reconnect_;
   asio::steady_timer farewell_;
+  asio::steady_timer gather_;
   rpc::Backoff backoff_{{}};
   std::chrono::milliseconds heartbeat_every_{1000};
-  bool open_ = false;           // a stream exists
-  bool welcome_ = false;        // and the server has accepted it
-  bool draining_ = false;       // takes nothing new
-  bool leaving_ = false;        // everything is sent, the stream is being closed
-  bool told_to_leave_ = false;  // by a signal, which leaves time
-  bool stopping_ = false;       // a signal was caught, or that time is over
+  std::chrono::milliseconds gather_for_{0};  // states go together that come within it
+  bool gathers_ = false;                     // some wait to be sent
+  bool open_ = false;                        // a stream exists
+  bool welcome_ = false;                     // and the server has accepted it
+  bool draining_ = false;                    // takes nothing new
+  bool leaving_ = false;                     // everything is sent, the stream is being closed
+  bool told_to_leave_ = false;               // by a signal, which leaves time
+  bool stopping_ = false;                    // a signal was caught, or that time is over
   bool said_refusal_ = false;
   bool looks_why_ = false;  // another thread does
   bool said_why_ = false;   // in this outage

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -28,26 +29,42 @@ using google::protobuf::Reflection;
 /// How much of a text is shown in a sentence [bytes]. Chosen: a name, not a document.
 constexpr std::size_t kShown = 40;
 
-absl::Status CheckText(const std::string& path, v1::Text text, bool required,
-                       const std::string& value) {
+/// How a field is reached. A message has hundreds of them: the text is put together only where a
+/// sentence needs it.
+struct Place {
+  const Place* parent = nullptr;
+  std::string_view name;
+  int index = -1;  ///< in a list
+
+  [[nodiscard]] std::string Text() const {
+    std::string text = parent == nullptr ? std::string(name)
+                                         : absl::StrCat(parent->Text(), ".", std::string(name));
+    if (index >= 0) absl::StrAppend(&text, "[", index, "]");
+    return text;
+  }
+};
+
+// path: gives the text of a place.
+template <class Path>
+absl::Status CheckText(const Path& path, v1::Text text, bool required, const std::string& value) {
   if (value.empty()) {
-    return required ? absl::InvalidArgumentError(absl::StrCat(path, " is empty"))
+    return required ? absl::InvalidArgumentError(absl::StrCat(path(), " is empty"))
                     : absl::OkStatus();
   }
   if (value.size() > LongestOf(text)) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, " has ", value.size(), " bytes, at most ", LongestOf(text)));
+        absl::StrCat(path(), " has ", value.size(), " bytes, at most ", LongestOf(text)));
   }
   if (!HasForm(text, value)) {
-    return absl::InvalidArgumentError(absl::StrCat(path, " is \"",
+    return absl::InvalidArgumentError(absl::StrCat(path(), " is \"",
                                                    absl::CHexEscape(value.substr(0, kShown)),
                                                    "\", it has to be ", FormOf(text)));
   }
   return absl::OkStatus();
 }
 
-template <class Number>
-absl::Status CheckNumber(const std::string& path, const v1::Rule& rule, Number value) {
+template <class Path, class Number>
+absl::Status CheckNumber(const Path& path, const v1::Rule& rule, Number value) {
   const auto number = static_cast<double>(value);
   const bool good = std::isnan(number)   ? rule.may_be_nan()
                     : std::isinf(number) ? rule.may_be_infinite()
@@ -61,30 +78,36 @@ absl::Status CheckNumber(const std::string& path, const v1::Rule& rule, Number v
   if (rule.has_min()) allowed.push_back(absl::StrCat("at least ", rule.min()));
   if (rule.has_max()) allowed.push_back(absl::StrCat("at most ", rule.max()));
   return absl::InvalidArgumentError(
-      absl::StrCat(path, " is ", value, ", it has to be ", absl::StrJoin(allowed, " and ")));
+      absl::StrCat(path(), " is ", value, ", it has to be ", absl::StrJoin(allowed, " and ")));
 }
 
 /// One message with the path that leads to it.
 class Check {
  public:
-  static absl::Status Of(const Message& message, const std::string& path) {
+  static absl::Status Of(const Message& message, const Place& place) {
     const Descriptor& type = *message.GetDescriptor();
     for (int k = 0; k < type.field_count(); ++k) {
-      RETURN_IF_ERROR(Check(message, *type.field(k), path).Field());
+      RETURN_IF_ERROR(Check(message, *type.field(k), place).Field());
     }
     return absl::OkStatus();
   }
 
  private:
-  Check(const Message& message, const FieldDescriptor& field, const std::string& path)
+  Check(const Message& message, const FieldDescriptor& field, const Place& parent)
       : message_(message),
         reflection_(*message.GetReflection()),
         field_(field),
         rule_(field.options().GetExtension(v1::rule)),
-        parent_(path) {}
+        parent_(parent) {}
 
-  [[nodiscard]] std::string Path() const { return absl::StrCat(parent_, ".", field_.name()); }
-  [[nodiscard]] std::string Path(int k) const { return absl::StrCat(Path(), "[", k, "]"); }
+  [[nodiscard]] Place Here(int k = -1) const {
+    return {.parent = &parent_, .name = field_.name(), .index = k};
+  }
+  [[nodiscard]] std::string Path() const { return Here().Text(); }
+  /// Path(), or that of an entry of a list, for CheckText() and CheckNumber().
+  [[nodiscard]] auto PathOf(int k = -1) const {
+    return [this, k] { return Here(k).Text(); };
+  }
 
   absl::Status Field() const {
     if (field_.is_repeated()) {
@@ -97,16 +120,16 @@ class Check {
     }
     switch (field_.cpp_type()) {
       case FieldDescriptor::CPPTYPE_DOUBLE:
-        return CheckNumber(Path(), rule_, reflection_.GetDouble(message_, &field_));
+        return CheckNumber(PathOf(), rule_, reflection_.GetDouble(message_, &field_));
       case FieldDescriptor::CPPTYPE_INT32:
-        return CheckNumber(Path(), rule_, reflection_.GetInt32(message_, &field_));
+        return CheckNumber(PathOf(), rule_, reflection_.GetInt32(message_, &field_));
       case FieldDescriptor::CPPTYPE_INT64:
-        return CheckNumber(Path(), rule_, reflection_.GetInt64(message_, &field_));
+        return CheckNumber(PathOf(), rule_, reflection_.GetInt64(message_, &field_));
       case FieldDescriptor::CPPTYPE_UINT64:
-        return CheckNumber(Path(), rule_, reflection_.GetUInt64(message_, &field_));
+        return CheckNumber(PathOf(), rule_, reflection_.GetUInt64(message_, &field_));
       case FieldDescriptor::CPPTYPE_STRING: {
         std::string scratch;
-        return CheckText(Path(), rule_.text(), rule_.required(),
+        return CheckText(PathOf(), rule_.text(), rule_.required(),
                          reflection_.GetStringReference(message_, &field_, &scratch));
       }
       case FieldDescriptor::CPPTYPE_ENUM: {
@@ -118,7 +141,7 @@ class Check {
                                       std::string(field_.enum_type()->name())));
       }
       case FieldDescriptor::CPPTYPE_MESSAGE:
-        return Of(reflection_.GetMessage(message_, &field_), Path());
+        return Of(reflection_.GetMessage(message_, &field_), Here());
       default:  // a truth value; ProblemsOfRules() has no other type pass
         return absl::OkStatus();
     }
@@ -141,14 +164,14 @@ class Check {
         for (int k = 0; k < size; ++k) {
           std::string scratch;
           RETURN_IF_ERROR(
-              CheckText(Path(k), rule_.text(), rule_.required(),
+              CheckText(PathOf(k), rule_.text(), rule_.required(),
                         reflection_.GetRepeatedStringReference(message_, &field_, k, &scratch)));
         }
         return absl::OkStatus();
       default:
         for (int k = 0; k < size; ++k) {
           const Message& entry = reflection_.GetRepeatedMessage(message_, &field_, k);
-          RETURN_IF_ERROR(field_.is_map() ? Entry(entry) : Of(entry, Path(k)));
+          RETURN_IF_ERROR(field_.is_map() ? Entry(entry) : Of(entry, Here(k)));
         }
         return absl::OkStatus();
     }
@@ -159,7 +182,7 @@ class Check {
     const auto numbers = reflection_.GetRepeatedFieldRef<Number>(message_, &field_);
     int k = 0;
     for (const Number number : numbers) {
-      RETURN_IF_ERROR(CheckNumber(Path(k), rule_, number));
+      RETURN_IF_ERROR(CheckNumber(PathOf(k), rule_, number));
       ++k;
     }
     return absl::OkStatus();
@@ -171,8 +194,9 @@ class Check {
     const FieldDescriptor& key = *field_.message_type()->map_key();
     const FieldDescriptor& value = *field_.message_type()->map_value();
     const std::string name = reflection.GetString(entry, &key);
-    RETURN_IF_ERROR(CheckText(absl::StrCat("a key of ", Path()), rule_.key(), true, name));
-    const std::string path = absl::StrCat(Path(), "[", name, "]");
+    RETURN_IF_ERROR(
+        CheckText([this] { return absl::StrCat("a key of ", Path()); }, rule_.key(), true, name));
+    const auto path = [&] { return absl::StrCat(Path(), "[", name, "]"); };
     return value.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE
                ? CheckNumber(path, rule_, reflection.GetDouble(entry, &value))
                : CheckText(path, rule_.text(), rule_.required(),
@@ -183,7 +207,7 @@ class Check {
   const Reflection& reflection_;
   const FieldDescriptor& field_;
   const v1::Rule& rule_;
-  const std::string& parent_;
+  const Place& parent_;
 };
 
 bool IsText(const FieldDescriptor& field) {
@@ -236,7 +260,7 @@ void AddProblems(const Descriptor& type, std::vector<std::string>& problems) {
 }  // namespace
 
 absl::Status CheckMessage(const Message& message) {
-  return Check::Of(message, std::string(message.GetDescriptor()->name()));
+  return Check::Of(message, {.name = message.GetDescriptor()->name()});
 }
 
 std::vector<std::string> ProblemsOfRules() {

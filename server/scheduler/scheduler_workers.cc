@@ -1,4 +1,6 @@
 // Workers: their links, leases and messages. Campaigns: scheduler.cc.
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -107,6 +109,8 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   v1::ServerMessage welcome;
   welcome.mutable_welcome()->set_heartbeat_ms(static_cast<int>(options_.heartbeat.count()));
   welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
+  welcome.mutable_welcome()->set_gather_ms(
+      static_cast<int>(std::min(options_.gather, options_.heartbeat).count()));
   ports_.Send(session, std::move(welcome));
   if (workers_.Find(hello.name())->draining) {  // it may have missed the message
     SendDrain(*workers_.Find(hello.name()));
@@ -222,11 +226,61 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   if (worker == nullptr) {
     return;
   }
-  if (!leases_.Named(batch.attempt(), worker->hello.name(), ports_.Now())) {
-    Refuse(session, batch.attempt());
+  auto taken = TakeStates(session, *worker, batch);
+  if (!taken.has_value()) {
     return;
   }
-  const EvaluationKey key = leases_.Find(batch.attempt(), worker->hello.name())->key;
+  v1::ServerMessage answer;
+  *answer.mutable_ack() = taken->ack;
+  WriteStates(session, taken->campaign, std::move(taken->records), std::move(answer));
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::StateBatches& gathered) {
+  const WorkerEntry* worker = Heard(session);
+  if (worker == nullptr) {
+    return;
+  }
+  struct Together {
+    std::vector<store::StateRecord> records;
+    v1::ServerMessage answer;
+  };
+  std::map<std::int64_t, Together> by_campaign;  // what the store refuses is the trouble of one
+  for (const v1::StateBatch& batch : gathered.batches()) {
+    if (auto taken = TakeStates(session, *worker, batch); taken.has_value()) {
+      Together& together = by_campaign[taken->campaign];
+      std::move(taken->records.begin(), taken->records.end(), std::back_inserter(together.records));
+      *together.answer.mutable_acks()->add_acks() = taken->ack;
+    }
+  }
+  for (auto& [campaign, together] : by_campaign) {
+    WriteStates(session, campaign, std::move(together.records), std::move(together.answer));
+  }
+}
+
+void Scheduler::WriteStates(std::int64_t session, std::int64_t campaign,
+                            std::vector<store::StateRecord> records, v1::ServerMessage answer) {
+  Write(
+      campaign,
+      [records = std::move(records), now = ports_.UnixMs()](Transaction& transaction) {
+        for (const store::StateRecord& record : records) {
+          transaction.PutState(record, now);
+        }
+      },
+      [this, session, answer = std::move(answer)](const absl::Status& status) mutable {
+        if (status.ok()) {
+          ports_.Send(session, std::move(answer));
+        }
+      });
+}
+
+std::optional<Scheduler::TakenStates> Scheduler::TakeStates(std::int64_t session,
+                                                            const WorkerEntry& worker,
+                                                            const v1::StateBatch& batch) {
+  if (!leases_.Named(batch.attempt(), worker.hello.name(), ports_.Now())) {
+    Refuse(session, batch.attempt());
+    return std::nullopt;
+  }
+  const EvaluationKey key = leases_.Find(batch.attempt(), worker.hello.name())->key;
   CampaignRun& run = *FindRun(key.campaign);  // leases end with their campaign
   const auto fail = [&](const std::string& why) {
     GiveBack(*Release(batch.attempt()), Because(batch.attempt(), why), AttemptOutcome::kFailed,
@@ -237,7 +291,7 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
       static_cast<std::size_t>(batch.states_size()) > most &&
       !run.definition().campaign.program) {  // which may tell more of one step line by line
     fail(absl::StrCat(batch.states_size(), " states at once of a path of ", most, " load steps"));
-    return;
+    return std::nullopt;
   }
   std::vector<store::StateRecord> records;
   for (const v1::State& state : batch.states()) {
@@ -248,7 +302,7 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
     if (const std::string refusal = run.Refusal(key, record.load_step, record.observables);
         !refusal.empty()) {
       fail(refusal);
-      return;
+      return std::nullopt;
     }
     records.push_back(std::move(record));
   }
@@ -264,23 +318,12 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   arrivals_[key.campaign].Add(ports_.Now(), static_cast<std::int64_t>(records.size()));
   if (stop) {
     StopEarly(session, *Release(batch.attempt()), std::move(records));
-    return;
+    return std::nullopt;
   }
-  v1::ServerMessage ack;
-  ack.mutable_ack()->set_attempt(batch.attempt());
-  ack.mutable_ack()->set_up_to(batch.first() + batch.states_size());
-  Write(
-      key.campaign,
-      [records = std::move(records), now = ports_.UnixMs()](Transaction& transaction) {
-        for (const store::StateRecord& record : records) {
-          transaction.PutState(record, now);
-        }
-      },
-      [this, session, ack](const absl::Status& status) {
-        if (status.ok()) {
-          ports_.Send(session, ack);
-        }
-      });
+  TakenStates taken{.campaign = key.campaign, .records = std::move(records)};
+  taken.ack.set_attempt(batch.attempt());
+  taken.ack.set_up_to(batch.first() + batch.states_size());
+  return taken;
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {

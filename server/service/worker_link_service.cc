@@ -128,6 +128,9 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
     const v1::WorkerMessage message = std::exchange(incoming_, {});
     unwritten_bytes_ += message.ByteSizeLong();
     ++unwritten_messages_;
+    if (!broken.ok() && message.has_gathered() && !name_.empty()) {
+      return TakeOneByOne(message.gathered());
+    }
     if (!broken.ok()) {
       v1::Ack answer;  // what it says of an attempt is answered, if it can be one at all
       answer.set_attempt(AttemptOf(message));
@@ -152,6 +155,9 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       case v1::WorkerMessage::kStates:
         scheduler.Receive(session_, message.states());
         break;
+      case v1::WorkerMessage::kGathered:
+        scheduler.Receive(session_, message.gathered());
+        break;
       case v1::WorkerMessage::kFinished:
         scheduler.Receive(session_, message.finished());
         break;
@@ -164,6 +170,21 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
         return absl::InvalidArgumentError("only the first message may be Hello");
       case v1::WorkerMessage::MESSAGE_NOT_SET:
         return absl::InvalidArgumentError("an empty message");
+    }
+    return absl::OkStatus();
+  }
+
+  /// On the strand: the batches of a message that breaks a rule; those that keep them all count.
+  absl::Status TakeOneByOne(const v1::StateBatches& gathered) {
+    for (const v1::StateBatch& batch : gathered.batches()) {
+      v1::Ack answer;
+      answer.set_attempt(batch.attempt());
+      RETURN_IF_ERROR(rpc::CheckMessage(answer));
+      if (const absl::Status kept = rpc::CheckMessage(batch); kept.ok()) {
+        core_.scheduler().Receive(session_, batch);
+      } else {
+        core_.scheduler().Reject(session_, batch.attempt(), std::string(kept.message()));
+      }
     }
     return absl::OkStatus();
   }

@@ -1,11 +1,16 @@
 // load --server HOST:PORT ...: workers without mechanics at a running calibd, in one process;
 // prints one JSON object. See README.md.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,7 +31,35 @@ struct Options {
   double seconds = 20;  // s, that count
   int states = 100;     // of a run
   int samples = 0;      // of the campaign; 0: as many as the time takes
+  bool null = false;    // the server is a load_null
+  int pid = 0;          // of the server, where it is on this machine; 0: not known
 };
+
+struct Used {
+  double cpu_seconds = std::nan("");
+  double rss_mib = std::nan("");
+};
+
+/// Of a process, by its files of /proc.
+Used UsedBy(int pid) {
+  Used used;
+  std::ifstream stat(absl::StrCat("/proc/", pid, "/stat"));
+  std::string text((std::istreambuf_iterator<char>(stat)), {});
+  const std::size_t name_ends = text.rfind(')');
+  if (name_ends == std::string::npos) return used;
+  std::istringstream fields(text.substr(name_ends + 1));
+  constexpr int kBeforeUser = 11;  // proc(5): utime is the 14th, the name the second
+  std::string skipped;
+  for (int k = 0; k < kBeforeUser; ++k) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  used.cpu_seconds = (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  std::ifstream pages(absl::StrCat("/proc/", pid, "/statm"));
+  double all = 0, resident = 0;
+  pages >> all >> resident;
+  used.rss_mib = resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1024.0 * 1024.0);
+  return used;
+}
 
 // Spheres that hit a wall at many angles: a state each.
 std::string CampaignFile(int samples) {
@@ -53,6 +86,8 @@ std::string Measurement(int states) {
   return csv;
 }
 
+constexpr double kMicro = 1e6;
+
 double Quantile(const std::vector<float>& sorted, double p) {
   if (sorted.empty()) return std::nan("");
   return sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size() - 1))];
@@ -61,16 +96,19 @@ double Quantile(const std::vector<float>& sorted, double p) {
 int Run(const Options& o) {
   calib::rpc::AccessChoice choice;
   choice.token = o.token;
-  const auto access = calib::rpc::FindAccess(o.server, choice);
+  const auto access = o.null ? absl::StatusOr<calib::rpc::Access>(calib::rpc::Access{})
+                             : calib::rpc::FindAccess(o.server, choice);
   if (!access.ok()) {
     std::cerr << "load: " << access.status().message() << "\n";
     return 2;
   }
   const double taken = o.rate * (o.warm_up + o.seconds) / o.states + o.workers * o.slots;
   const int samples = o.samples > 0 ? o.samples : static_cast<int>(1.2 * taken) + 10;
-  calib::testing::Client client(o.server, choice);
-  const auto campaign = client.SubmitCampaign(
-      CampaignFile(samples), {{"wall.csv", Measurement(o.states)}}, absl::StrCat("load ", samples));
+  const auto campaign =
+      o.null ? absl::StatusOr<std::string>("none")
+             : calib::testing::Client(o.server, choice)
+                   .SubmitCampaign(CampaignFile(samples), {{"wall.csv", Measurement(o.states)}},
+                                   absl::StrCat("load ", samples));
   if (!campaign.ok()) {
     std::cerr << "load: " << campaign.status().message() << "\n";
     return 1;
@@ -89,14 +127,17 @@ int Run(const Options& o) {
   const auto end = counted + std::chrono::duration<double>(o.seconds);
   constexpr std::chrono::milliseconds kTick{5};  // as fine as a birth is known
   bool counts = false;
+  Used before;
   for (auto now = begun; now < end; now = Clock::now()) {
     if (!counts && now >= counted) {
       for (const auto& worker : workers) worker->Count();
       counts = true;
+      before = UsedBy(o.pid);
     }
     for (const auto& worker : workers) worker->Tick(now);
     std::this_thread::sleep_until(now + kTick);
   }
+  const Used after = UsedBy(o.pid);
   std::vector<float> waits;
   std::int64_t finished = 0, refused = 0, ended = 0;
   std::string why;
@@ -119,6 +160,9 @@ int Run(const Options& o) {
                     {"p50_ms", Quantile(waits, 0.5)},
                     {"p99_ms", Quantile(waits, 0.99)},
                     {"largest_ms", waits.empty() ? std::nan("") : waits.back()},
+                    {"server_us_per_state", kMicro * (after.cpu_seconds - before.cpu_seconds) /
+                                                static_cast<double>(waits.size())},
+                    {"server_rss_mib", after.rss_mib},
                     {"runs_finished", finished},
                     {"leases_lost", refused},
                     {"streams_ended", ended},
@@ -140,6 +184,8 @@ int main(int argc, char** argv) {
   app.add_option("--warm-up", o.warm_up, "s")->check(CLI::NonNegativeNumber);
   app.add_option("--seconds", o.seconds, "that count")->check(CLI::PositiveNumber);
   app.add_option("--states", o.states, "of a run")->check(CLI::Range(1, 1000));
+  app.add_flag("--null", o.null, "the server is a load_null");
+  app.add_option("--pid", o.pid, "of the server: its processor time and memory are told");
   app.add_option("--samples", o.samples, "of the campaign")->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
   return Run(o);

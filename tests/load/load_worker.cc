@@ -43,6 +43,7 @@ class LoadWorker::Stream : public grpc::ClientBidiReactor<v1::WorkerMessage, v1:
     const std::lock_guard lock(mutex_);
     if (!seen_.ended.empty()) return;
     for (auto& [attempt, run] : runs_) SendStates(attempt, run, now);
+    if (gathered_.batches_size() > 0 && now >= gathered_since_ + gather_) SendGathered();
     if (now >= next_heartbeat_) {
       v1::WorkerMessage beat;
       beat.mutable_heartbeat();
@@ -106,10 +107,8 @@ class LoadWorker::Stream : public grpc::ClientBidiReactor<v1::WorkerMessage, v1:
 
   void SendStates(std::int64_t attempt, Run& run, Clock::time_point now) {
     if (run.due > now || run.births.size() == run.load_steps.size()) return;
-    v1::WorkerMessage message;
-    v1::StateBatch& batch = *message.mutable_states();
-    batch.set_attempt(attempt);
-    batch.set_first(static_cast<std::int64_t>(run.births.size()));
+    if (gathered_.batches_size() == 0) gathered_since_ = run.due;
+    v1::StateBatch& batch = BatchOf(attempt, run);
     while (run.due <= now && run.births.size() < run.load_steps.size()) {
       v1::State& state = *batch.add_states();
       state.set_load_step(run.load_steps[run.births.size()]);
@@ -119,8 +118,8 @@ class LoadWorker::Stream : public grpc::ClientBidiReactor<v1::WorkerMessage, v1:
       run.births.push_back(run.due);
       run.due += interval_;
     }
-    Send(std::move(message));
     if (run.births.size() < run.load_steps.size()) return;
+    SendGathered();  // the end comes last
     v1::WorkerMessage end;
     v1::Finished& finished = *end.mutable_finished();
     finished.set_attempt(attempt);
@@ -130,13 +129,41 @@ class LoadWorker::Stream : public grpc::ClientBidiReactor<v1::WorkerMessage, v1:
     Send(std::move(end));
   }
 
+  /// What is to be sent of a run, after what is there of it already.
+  v1::StateBatch& BatchOf(std::int64_t attempt, const Run& run) {
+    for (v1::StateBatch& batch : *gathered_.mutable_batches()) {
+      if (batch.attempt() == attempt) return batch;
+    }
+    v1::StateBatch& batch = *gathered_.add_batches();
+    batch.set_attempt(attempt);
+    batch.set_first(static_cast<std::int64_t>(run.births.size()));
+    return batch;
+  }
+
+  void SendGathered() {
+    v1::WorkerMessage message;
+    if (gather_.count() > 0) {
+      message.mutable_gathered()->Swap(&gathered_);
+      Send(std::move(message));
+    } else {
+      for (v1::StateBatch& batch : *gathered_.mutable_batches()) {
+        message.mutable_states()->Swap(&batch);
+        Send(std::exchange(message, {}));
+      }
+    }
+    gathered_.Clear();
+  }
+
   void Hear(const v1::ServerMessage& message) {
     if (message.has_welcome()) {
       heartbeat_ = std::chrono::milliseconds(message.welcome().heartbeat_ms());
+      gather_ = std::chrono::milliseconds(message.welcome().gather_ms());
     } else if (message.has_lease()) {
       Take(message.lease());
     } else if (message.has_ack()) {
       Hear(message.ack());
+    } else if (message.has_acks()) {
+      for (const v1::Ack& ack : message.acks().acks()) Hear(ack);
     } else if (message.has_stop()) {
       runs_.erase(message.stop().attempt());
     }
@@ -182,6 +209,9 @@ class LoadWorker::Stream : public grpc::ClientBidiReactor<v1::WorkerMessage, v1:
   std::condition_variable done_;
   std::deque<v1::WorkerMessage> outgoing_;  // the first is being written
   std::map<std::int64_t, Run> runs_;        // by attempt
+  v1::StateBatches gathered_;               // not sent yet
+  Clock::time_point gathered_since_;
+  std::chrono::milliseconds gather_{0};
   Clock::duration heartbeat_ = std::chrono::seconds(1);
   Clock::time_point next_heartbeat_ = Clock::now() + std::chrono::seconds(1);
   Seen seen_;

@@ -48,6 +48,29 @@ TEST(CampaignLife, SilentWorkersAttemptGoesToAnotherAndItsLateWordsAreRefused) {
   EXPECT_TRUE(service.Read().States(1)->empty());
 }
 
+TEST(CampaignLife, GatheredStatesOfSeveralRunsAreAcknowledgedTogetherOnceTheyAreOnDisk) {
+  SimulatedService service("gathered");
+  service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 3);
+  EXPECT_GT(service.Next(worker, Kind::kWelcome).welcome().gather_ms(), 0);
+  std::vector<v1::Lease> leases;
+  for (int k = 0; k < 3; ++k) leases.push_back(service.Next(worker, Kind::kLease).lease());
+  v1::StateBatches gathered;
+  for (const v1::Lease& lease : leases) {
+    *gathered.add_batches() = service.States(lease, 0, 2);
+  }
+  gathered.mutable_batches(1)->mutable_states(0)->set_load_step(999);  // of no path
+  service.scheduler().Receive(worker, gathered);
+  EXPECT_FALSE(service.Next(worker, Kind::kAcks).has_acks()) << "nothing is on disk yet";
+  service.ports().Run();
+  const v1::Acks acks = service.Next(worker, Kind::kAcks).acks();
+  ASSERT_EQ(acks.acks_size(), 2) << "the wrong one has failed by itself";
+  EXPECT_EQ(acks.acks(0).attempt(), leases[0].attempt());
+  EXPECT_EQ(acks.acks(1).attempt(), leases[2].attempt());
+  EXPECT_EQ(acks.acks(1).up_to(), 2);
+  EXPECT_EQ(service.Read().States(1)->size(), 4U);
+}
+
 TEST(CampaignLife, ALargeNodeIsFilledInSeveralTurns) {
   constexpr int kSlots = 200;
   SimulatedService service("large_node");

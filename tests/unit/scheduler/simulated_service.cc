@@ -168,8 +168,7 @@ v1::ServerMessage SimulatedService::Next(std::int64_t session,
   return {};
 }
 
-void SimulatedService::SendStates(std::int64_t session, const v1::Lease& lease, int first,
-                                  int count) {
+v1::StateBatch SimulatedService::States(const v1::Lease& lease, int first, int count) const {
   v1::StateBatch batch;
   batch.set_attempt(lease.attempt());
   batch.set_first(first);
@@ -181,7 +180,12 @@ void SimulatedService::SendStates(std::int64_t session, const v1::Lease& lease, 
       state.add_values(Model(lease.spec(), i, packing_scatter, repeat_scatter));
     }
   }
-  scheduler_->Receive(session, batch);
+  return batch;
+}
+
+void SimulatedService::SendStates(std::int64_t session, const v1::Lease& lease, int first,
+                                  int count) {
+  scheduler_->Receive(session, States(lease, first, count));
   ports_->Run();
 }
 

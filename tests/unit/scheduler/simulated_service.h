@@ -75,6 +75,7 @@ class SimulatedService {
   /// The next message of this kind for a session, others skipped; an empty message when there is
   /// none.
   v1::ServerMessage Next(std::int64_t session, v1::ServerMessage::MessageCase kind);
+  v1::StateBatch States(const v1::Lease& lease, int first, int count) const;
   void SendStates(std::int64_t session, const v1::Lease& lease, int first, int count);
   void SendEnd(std::int64_t session, std::int64_t attempt, v1::Finished::Outcome outcome,
                const std::string& reason = "");

@@ -44,6 +44,20 @@ TEST(HeldAttempt, SendsEachStateOnceAndTheEndLast) {
   EXPECT_TRUE(attempt.TakeUnsent().empty());
 }
 
+TEST(HeldAttempt, StatesThatAreTakenToGoWithOthersAreNotSentAgain) {
+  HeldAttempt attempt(LeaseOfSeven());
+  AddStates(attempt, 0, 2);
+  attempt.AddEnd(Completed());
+  const auto batches = attempt.TakeUnsentStates();
+  ASSERT_EQ(batches.size(), 1U);
+  EXPECT_EQ(batches[0].attempt(), 7);
+  EXPECT_EQ(batches[0].states_size(), 2);
+  EXPECT_TRUE(attempt.TakeUnsentStates().empty());
+  const auto messages = attempt.TakeUnsent();
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_TRUE(messages[0].has_finished()) << "the end is left";
+}
+
 TEST(HeldAttempt, SendsWhatIsNotAcknowledgedAgainOverANewStream) {
   HeldAttempt attempt(LeaseOfSeven());
   AddStates(attempt, 0, 5);
