@@ -131,7 +131,7 @@ class Scheduler {
   /// Campaigns that are not over.
   std::size_t live() const { return runs_.size(); }
   /// Evaluations that wait for a slot, and campaigns with a plan in the making.
-  std::size_t queued() const { return queue_.size(); }
+  std::size_t queued() const { return waiting_.size(); }
   std::size_t planning() const { return computing_.size(); }
 
  private:

@@ -265,13 +265,14 @@ absl::StatusOr<std::vector<store::CampaignRecord>> Descent::ChildrenOf(store::Re
   std::vector<std::int64_t> ids;
   {
     const absl::MutexLock lock(&mutex_);
+    ASSIGN_OR_RETURN(const auto last, reader.LastCampaign());
     ASSIGN_OR_RETURN(const auto texts, reader.TextsWith("lineage", read_to_));
     for (const auto& [id, text] : texts) {
+      if (id > last) continue;  // it has come meanwhile, and is read the next time
       if (const auto from = ParseCampaign(campaign::OriginOf(text).parent); from.ok()) {
         children_.emplace(*from, id);
       }
     }
-    ASSIGN_OR_RETURN(const auto last, reader.LastCampaign());
     read_to_ = std::max(read_to_, last);
     const auto [begin, end] = children_.equal_range(parent);
     for (auto child = begin; child != end; ++child) ids.push_back(child->second);

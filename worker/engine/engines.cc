@@ -9,7 +9,6 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "calib/v1/engine.pb.h"
-#include "worker/engine/frames.h"
 
 namespace calib::worker {
 namespace {
@@ -33,10 +32,15 @@ v1::Finished Ended(v1::Finished::Outcome outcome, std::string reason) {
 /// One run in one process.
 class Engines::Talk {
  public:
-  Talk(ChildProcess& engine, const EnginesOptions& options,
+  Talk(Engine& engine, const EnginesOptions& options,
        const std::function<void(v1::State)>& on_state, const std::stop_token& stop,
        const std::stop_token& leave)
-      : engine_(engine), options_(options), on_state_(on_state), stop_(stop), leave_(leave) {}
+      : engine_(*engine.process),
+        reader_(engine.reader),
+        options_(options),
+        on_state_(on_state),
+        stop_(stop),
+        leave_(leave) {}
 
   v1::Finished Run(const v1::Lease& lease) {
     v1::EngineOrder order;
@@ -116,11 +120,11 @@ class Engines::Talk {
   }
 
   ChildProcess& engine_;
+  FrameReader& reader_;
   const EnginesOptions& options_;
   const std::function<void(v1::State)>& on_state_;
   const std::stop_token& stop_;
   const std::stop_token& leave_;
-  FrameReader reader_;
   std::int64_t states_ = 0;
   double cpu_before_ = 0;  // s
   std::optional<v1::Finished> finished_;
@@ -132,11 +136,11 @@ Engines::Engines(EnginesOptions options) : options_(std::move(options)) {}
 
 Engines::~Engines() {
   const absl::MutexLock lock(&mutex_);
-  for (const auto& engine : idle_) engine->CloseInput();
-  for (const auto& engine : idle_) {
+  for (const Engine& engine : idle_) engine.process->CloseInput();
+  for (const Engine& engine : idle_) {
     for (const auto until = Clock::now() + kToLeave;
-         !engine->end().has_value() && Clock::now() < until;) {
-      engine->Turn(kBetweenLooks, [](std::string_view) {});
+         !engine.process->end().has_value() && Clock::now() < until;) {
+      engine.process->Turn(kBetweenLooks, [](std::string_view) {});
     }
   }
   idle_.clear();
@@ -150,30 +154,31 @@ v1::Finished Engines::Evaluate(const v1::Lease& lease,
     return Ended(v1::Finished::OUTCOME_FAILED,
                  absl::StrCat("no engine could be started: ", engine.status().message()));
   }
-  v1::Finished finished = Talk(**engine, options_, on_state, stop, leave).Run(lease);
-  if (const std::string words = (*engine)->words(); !words.empty()) {
+  v1::Finished finished = Talk(*engine, options_, on_state, stop, leave).Run(lease);
+  if (const std::string words = engine->process->words(); !words.empty()) {
     spdlog::warn("engine attempt={} words=\"{}\"", lease.attempt(), words);
   }
   GiveBack(*std::move(engine));
   return finished;
 }
 
-absl::StatusOr<std::unique_ptr<ChildProcess>> Engines::Take() {
+absl::StatusOr<Engines::Engine> Engines::Take() {
   while (true) {
-    std::unique_ptr<ChildProcess> engine;
+    Engine engine;
     {
       const absl::MutexLock lock(&mutex_);
       if (idle_.empty()) break;
       engine = std::move(idle_.back());
       idle_.pop_back();
     }
-    engine->Turn(std::chrono::milliseconds(0), [](std::string_view) {});
-    if (!engine->end().has_value()) return engine;
+    engine.process->Turn(std::chrono::milliseconds(0),
+                         [&engine](std::string_view bytes) { engine.reader.Add(bytes); });
+    if (!engine.process->end().has_value()) return engine;
   }
   return Start();
 }
 
-absl::StatusOr<std::unique_ptr<ChildProcess>> Engines::Start() {
+absl::StatusOr<Engines::Engine> Engines::Start() {
   std::string shared;
   {
     const absl::MutexLock lock(&mutex_);
@@ -196,12 +201,13 @@ absl::StatusOr<std::unique_ptr<ChildProcess>> Engines::Start() {
       options.arguments.push_back(word);
     }
   }
-  return launcher_.Start(options);
+  ASSIGN_OR_RETURN(auto process, launcher_.Start(options));
+  return Engine{.process = std::move(process)};
 }
 
-void Engines::GiveBack(std::unique_ptr<ChildProcess> engine) {
-  if (engine->end().has_value()) return;
-  engine->ForgetWords();
+void Engines::GiveBack(Engine engine) {
+  if (engine.process->end().has_value()) return;
+  engine.process->ForgetWords();
   const absl::MutexLock lock(&mutex_);
   idle_.push_back(std::move(engine));
 }

@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "calib/v1/worker.pb.h"
+#include "worker/engine/frames.h"
 #include "worker/program/child_process.h"
 #include "worker/program/fetch.h"
 #include "worker/program/launcher.h"
@@ -53,17 +54,21 @@ class Engines {
 
  private:
   class Talk;
+  struct Engine {
+    std::unique_ptr<ChildProcess> process;
+    FrameReader reader{};  // of all runs: a specimen may be asked for while none is under way
+  };
 
-  absl::StatusOr<std::unique_ptr<ChildProcess>> Take();
-  absl::StatusOr<std::unique_ptr<ChildProcess>> Start();
-  void GiveBack(std::unique_ptr<ChildProcess> engine);
+  absl::StatusOr<Engine> Take();
+  absl::StatusOr<Engine> Start();
+  void GiveBack(Engine engine);
 
   const EnginesOptions options_;
   Launcher launcher_;
   absl::Mutex mutex_;
   std::unique_ptr<Scratch> scratch_ ABSL_GUARDED_BY(mutex_);
   RunFolder shared_ ABSL_GUARDED_BY(mutex_);
-  std::vector<std::unique_ptr<ChildProcess>> idle_ ABSL_GUARDED_BY(mutex_);
+  std::vector<Engine> idle_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace calib::worker

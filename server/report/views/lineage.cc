@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -56,10 +57,9 @@ std::vector<v1::CampaignStatus> Descendants(const std::vector<v1::CampaignStatus
 
 std::vector<v1::CampaignStatus> ChildrenOf(const std::vector<v1::CampaignStatus>& campaigns,
                                            const std::string& campaign) {
-  std::vector<v1::CampaignStatus> children = Descendants(campaigns, campaign);
-  children.erase(std::remove_if(children.begin(), children.end(),
-                                [&campaign](const auto& c) { return c.parent() != campaign; }),
-                 children.end());
+  std::vector<v1::CampaignStatus> children;
+  std::copy_if(campaigns.begin(), campaigns.end(), std::back_inserter(children),
+               [&campaign](const auto& c) { return c.parent() == campaign; });
   return children;
 }
 

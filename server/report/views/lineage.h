@@ -23,7 +23,7 @@ std::vector<Branch> AsTree(const std::vector<v1::CampaignStatus>& campaigns);
 std::vector<v1::CampaignStatus> Descendants(const std::vector<v1::CampaignStatus>& campaigns,
                                             const std::string& campaign);
 
-/// The campaigns that come from `campaign` directly, in the order of AsTree().
+/// Those of `campaigns` that come from `campaign` directly, in their order.
 std::vector<v1::CampaignStatus> ChildrenOf(const std::vector<v1::CampaignStatus>& campaigns,
                                            const std::string& campaign);
 

@@ -47,6 +47,7 @@ def wrong_with(document):
 def campaigns():
     """Every whole campaign that is shipped or shown."""
     for path in sorted((ROOT / 'deploy').rglob('*.yaml')):
+        if 'kubernetes' in path.parts: continue  # no campaigns
         yield path.name, path.read_text(encoding='utf-8')
     text = (ROOT / 'server/campaign/CAMPAIGN_FILE.md').read_text(encoding='utf-8')
     for number, block in enumerate(re.findall(r'```yaml\n(.*?)```', text, re.S)):

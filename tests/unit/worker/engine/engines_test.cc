@@ -206,6 +206,24 @@ TEST_F(EnginesOfALongRun, ThatDoNotHearAStopAreKilled) {
   EXPECT_TRUE(Children().empty());
 }
 
+// The making of a specimen goes on when its run is stopped, and may ask for content while no run is
+// under way.
+TEST_F(EnginesOfAWorker, GoOnAfterARunThatWasStoppedAtOnce) {
+  for (int i = 0; i < 40; ++i) {
+    std::stop_source stop;
+    std::jthread stopper([&, i] {
+      std::this_thread::sleep_for(std::chrono::microseconds(250 * i));
+      stop.request_stop();
+    });
+    Engines fresh(Options());  // a specimen that is not made yet
+    fresh.Evaluate(
+        lease_, [](const v1::State& /*state*/) {}, stop.get_token());
+    std::this_thread::sleep_for(std::chrono::milliseconds(i % 4));
+    const auto next = fresh.Evaluate(lease_, [](const v1::State& /*state*/) {}, {});
+    ASSERT_EQ(next.outcome(), v1::Finished::OUTCOME_COMPLETED) << i << ": " << next.reason();
+  }
+}
+
 TEST_F(EnginesOfAWorker, SayWhyThereIsNoSpecimen) {
   EnginesOptions options = Options();
   options.fetch = [](const std::string& /*digest*/, std::stop_token /*stop*/) {
