@@ -24,6 +24,14 @@ void Submit(const Deployment& deployment) {
   ASSERT_TRUE(id.ok()) << id.status();
 }
 
+bool HasCome(Client& client, const std::string& worker) {
+  return Eventually(kLong, [&] {
+    const auto workers = client.Workers();
+    return workers.ok() && std::any_of(workers->workers().begin(), workers->workers().end(),
+                                       [&](const auto& w) { return w.name() == worker; });
+  });
+}
+
 TEST(WorkerLost, KilledTenTimesAtRandomMoments) {
   Deployment deployment({.name = "killed-worker", .lease_ms = 500});
   ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
@@ -35,11 +43,7 @@ TEST(WorkerLost, KilledTenTimesAtRandomMoments) {
   for (int i = 0; i < 10; ++i) {
     deployment.StartWorker();
     const std::string name = "w" + std::to_string(i + 2);
-    ASSERT_TRUE(Eventually(kLong, [&] {
-      const auto workers = client.Workers();
-      return workers.ok() && std::any_of(workers->workers().begin(), workers->workers().end(),
-                                         [&](const auto& w) { return w.name() == name; });
-    })) << deployment.Logs();
+    ASSERT_TRUE(HasCome(client, name)) << deployment.Logs();
     std::this_thread::sleep_for(std::chrono::milliseconds(moment(random)));
     deployment.workers().back().Kill();
   }
@@ -230,11 +234,7 @@ TEST(WorkerLost, ToldToLeaveTheyLeaveCheckpoints) {
     deployment.StartWorker(2);
     Process& worker = deployment.workers().back();
     const std::string name = "w" + std::to_string(i + 1);
-    ASSERT_TRUE(Eventually(kLong, [&] {
-      const auto workers = client.Workers();
-      return workers.ok() && std::any_of(workers->workers().begin(), workers->workers().end(),
-                                         [&](const auto& w) { return w.name() == name; });
-    })) << deployment.Logs();
+    ASSERT_TRUE(HasCome(client, name)) << deployment.Logs();
     std::this_thread::sleep_for(std::chrono::milliseconds(moment(random)));
     if (i % 2 == 0) {
       worker.Signal(SIGTERM);

@@ -44,7 +44,6 @@ class Engines::Talk {
 
   v1::Finished Run(const v1::Lease& lease) {
     v1::EngineOrder order;
-    order.mutable_run()->set_attempt(lease.attempt());
     *order.mutable_run()->mutable_spec() = lease.spec();
     order.mutable_run()->set_run(lease.run());
     if (lease.has_rest_after()) order.mutable_run()->set_rest_after(lease.rest_after());

@@ -10,7 +10,8 @@
 
 namespace calib::worker {
 
-/// Larger is no message of ours.
+/// Larger is no message of ours. chosen: content comes in one piece, and a mesh may have hundreds
+/// of megabytes
 constexpr std::size_t kMostFrameBytes = std::size_t{1} << 30;
 
 /// A message as it goes over the pipe.

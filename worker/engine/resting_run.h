@@ -21,7 +21,8 @@ struct RestingRun {
   std::stop_token leave{};          ///< the run ends here and goes on elsewhere
 };
 
-/// How much of a run is lost at most when its machine fails. [issue: 10 min]
+/// How much of a run is lost at most when its machine fails. chosen: a file now and then is no
+/// load, and runs worth keeping take hours
 constexpr std::chrono::minutes kBetweenCheckpoints{10};
 
 /// Evaluate() (evaluate.h) from the checkpoint of this run, if there is one, until its rung: then

@@ -51,6 +51,16 @@ class EnginesOfAWorker : public ::testing::Test {
     return absl::NotFoundError("no such content");
   }
 
+  using States = std::vector<std::vector<double>>;
+
+  /// The same run in this process.
+  v1::Finished EvaluateHere(States& states) const {
+    Specimens specimens(
+        [this](const std::string& digest, std::stop_token /*stop*/) { return ContentOf(digest); });
+    return Evaluate(lease_.spec(), specimens,
+                    [&](const dem::State& state) { states.push_back(state.values); }, {});
+  }
+
   EnginesOptions Options() const {
     return {.program = CALIB_WORKER,
             .fetch = [this](const std::string& digest,
@@ -66,14 +76,11 @@ class EnginesOfAWorker : public ::testing::Test {
 };
 
 TEST_F(EnginesOfAWorker, GiveTheBitsThatTheMechanicsGiveHere) {
-  Specimens specimens(
-      [this](const std::string& digest, std::stop_token /*stop*/) { return ContentOf(digest); });
-  std::vector<std::vector<double>> here;
-  const auto expected = Evaluate(
-      lease_.spec(), specimens, [&](const dem::State& state) { here.push_back(state.values); }, {});
+  States here;
+  const v1::Finished expected = EvaluateHere(here);
   Engines engines(Options());
   for (int run = 0; run < 2; ++run) {
-    std::vector<std::vector<double>> there;
+    States there;
     const auto finished =
         engines.Evaluate(lease_,
                          [&](const v1::State& state) {
@@ -98,18 +105,14 @@ TEST_F(EnginesOfAWorker, MakeTheSamePackingOfARecipe) {
   recipe.set_aspect(1);
   recipe.set_pressure(1e4);
   recipe.set_seed(3);
-  Specimens specimens([](const std::string& digest, std::stop_token /*stop*/) {
-    return absl::StatusOr<std::string>(absl::NotFoundError(digest));
-  });
-  std::vector<std::vector<double>> here;
-  const auto expected = Evaluate(
-      lease_.spec(), specimens, [&](const dem::State& state) { here.push_back(state.values); }, {});
+  States here;
+  const v1::Finished expected = EvaluateHere(here);
   ASSERT_EQ(expected.outcome(), v1::Finished::OUTCOME_COMPLETED) << expected.reason();
   Engines engines(Options());
   std::vector<std::jthread> slots;
   for (int slot = 0; slot < 2; ++slot) {
     slots.emplace_back([&] {
-      std::vector<std::vector<double>> there;
+      States there;
       const auto finished =
           engines.Evaluate(lease_,
                            [&](const v1::State& state) {

@@ -63,7 +63,11 @@ export function fitFigure(experiment: FittedExperiment, observable: FittedObserv
   const title = `${nameForPeople(observable.name)} against ${nameForPeople(against.name)}`;
   const description =
     `${experiment.experiment}${held ? ", held out" : ""}: ${observable.values.filter(finite).length} readings` +
-    (median === null ? ", no posterior yet." : ", and the model over the posterior.");
+    (median === null
+      ? ", no posterior yet."
+      : known(bands?.q05)
+        ? ", and the model over the posterior."
+        : ", and the mean of the weighted runs; no interval is given.");
 
   const draw = (width: number): SVGSVGElement => {
     const band = (low: Maybe[] | null | undefined, high: Maybe[] | null | undefined, opacity: number): Plot.Markish =>
