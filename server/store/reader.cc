@@ -70,6 +70,7 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   if (!row.isColumnNull(17)) {
     record.kept_states = row.getColumn(17).getInt();
   }
+  record.priority = row.getColumn(18).getInt();
   return record;
 }
 
@@ -89,12 +90,12 @@ std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row)
 constexpr std::string_view kCampaignsAfter =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
     "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner, "
-    "(SELECT kept FROM pruned WHERE campaign = id) FROM campaign "
+    "(SELECT kept FROM pruned WHERE campaign = id), priority FROM campaign "
     "WHERE id > ? AND id NOT IN (SELECT campaign FROM leaving WHERE whole) ORDER BY id LIMIT ?";
 constexpr std::string_view kOneCampaign =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
     "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner, "
-    "(SELECT kept FROM pruned WHERE campaign = id) FROM campaign "
+    "(SELECT kept FROM pruned WHERE campaign = id), priority FROM campaign "
     "WHERE id = ? AND id NOT IN (SELECT campaign FROM leaving WHERE whole)";
 
 }  // namespace
@@ -300,7 +301,7 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
     std::vector<EvaluationRecord> records;
     SQLite::Statement& row = connection_->Bind(
         "SELECT sample, experiment, status, reason, failures, digest, reused, rest_after, held_in, "
-        "aside FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
+        "aside, losses FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
         campaign);
     while (row.executeStep()) {
       records.push_back(
@@ -311,6 +312,7 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
                ToEvaluationStatus(row.getColumn(2).getString(), row.getColumn(9).getInt() != 0),
            .reason = row.getColumn(3).getString(),
            .failures = row.getColumn(4).getInt(),
+           .losses = row.getColumn(10).getInt(),
            .digest = row.getColumn(5).getString(),
            .reused = row.getColumn(6).getInt() != 0,
            .rest_after = row.getColumn(7).isNull() ? std::nullopt
@@ -533,6 +535,17 @@ absl::StatusOr<std::int64_t> Reader::LastBackupUnixMs() {
         "SELECT coalesce(max(unix_ms), 0) FROM event WHERE campaign IS NULL AND what = ?",
         kBackupEvent);
     return row.executeStep() ? row.getColumn(0).getInt64() : std::int64_t{0};
+  });
+}
+
+absl::StatusOr<std::map<std::string, int>> Reader::Quotas() {
+  return Guard([&] {
+    std::map<std::string, int> quotas;
+    SQLite::Statement& row = connection_->Bind("SELECT owner, slots FROM quota");
+    while (row.executeStep()) {
+      quotas[row.getColumn(0).getString()] = row.getColumn(1).getInt();
+    }
+    return quotas;
   });
 }
 

@@ -86,6 +86,9 @@ class Reader {
   /// In the order in which they were last put.
   absl::StatusOr<std::vector<FindingRecord>> Findings(std::int64_t campaign);
 
+  /// Slots that the runs of an owner hold at most, where that is bounded.
+  absl::StatusOr<std::map<std::string, int>> Quotas();
+
   /// Contents that nothing names and that were put before this moment, if at all, with their bytes;
   /// at most so many.
   absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>> Unnamed(

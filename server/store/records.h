@@ -51,6 +51,7 @@ struct CampaignRecord {
   NewCampaign submitted{};
   CampaignProgress progress{};
   std::optional<int> kept_states{};  ///< samples whose states it was pruned to; empty: it was not
+  int priority = 0;                  ///< among its owner's campaigns; the highest first
 };
 
 /// A piece of what is removed.
@@ -95,7 +96,8 @@ struct EvaluationRecord {
   EvaluationKey key{};
   EvaluationStatus status = EvaluationStatus::kWaiting;
   std::string reason{};
-  int failures = 0;
+  int failures = 0;  ///< attempts whose engine or program failed
+  int losses = 0;    ///< that were lost with their node, or failed by it
   std::string digest{};
   bool reused = false;
   std::optional<int> rest_after{};  ///< load step at which it rests; empty: it runs to its end

@@ -125,6 +125,25 @@ void Transaction::SetProgress(std::int64_t campaign, const CampaignProgress& pro
   });
 }
 
+void Transaction::SetPriority(std::int64_t campaign, int priority) {
+  Guard([&] {
+    connection_.Run("UPDATE campaign SET priority = ? WHERE id = ?", priority, campaign);
+  });
+}
+
+void Transaction::SetQuota(const std::string& owner, std::optional<int> slots) {
+  Guard([&] {
+    if (slots.has_value()) {
+      connection_.Run(
+          "INSERT INTO quota(owner, slots) VALUES(?, ?) "
+          "ON CONFLICT DO UPDATE SET slots = excluded.slots",
+          owner, *slots);
+    } else {
+      connection_.Run("DELETE FROM quota WHERE owner = ?", owner);
+    }
+  });
+}
+
 void Transaction::Pause(std::int64_t campaign, const std::string& reason) {
   Guard([&] {
     connection_.Run("UPDATE campaign SET state = ?, reason = ? WHERE id = ?",
@@ -279,6 +298,14 @@ void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus statu
   });
 }
 
+void Transaction::SetLosses(const EvaluationKey& key, int losses) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE evaluation SET losses = ? WHERE campaign = ? AND sample = ? AND experiment = ?",
+        losses, key.campaign, key.sample, key.experiment);
+  });
+}
+
 void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest) {
   Guard([&] {
     for (const char* table : {"state", "kept"}) {
@@ -289,7 +316,7 @@ void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest)
     }
     connection_.Run(
         "UPDATE evaluation SET digest = ?, held_in = '', status = ?, aside = 0, reason = '', "
-        "failures = 0 "
+        "failures = 0, losses = 0 "
         "WHERE campaign = ? AND sample = ? AND experiment = ?",
         digest, ToString(EvaluationStatus::kWaiting), key.campaign, key.sample, key.experiment);
   });

@@ -45,6 +45,9 @@ class Transaction {
   /// files: path -> digest of a stored blob.
   void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
   void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
+  void SetPriority(std::int64_t campaign, int priority);
+  /// Slots that the runs of an owner hold at most, >= 0; empty: no bound.
+  void SetQuota(const std::string& owner, std::optional<int> slots);
   /// Whatever else is stored of its progress stays.
   void Pause(std::int64_t campaign, const std::string& reason);
   /// Requests that were given this answer are new again.
@@ -79,6 +82,8 @@ class Transaction {
   void InsertEvaluation(const EvaluationRecord& evaluation);
   void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
                      int failures);
+  /// See EvaluationRecord::losses.
+  void SetLosses(const EvaluationKey& key, int losses);
   /// The next attempt of the evaluation rests after this load step; empty: it runs to the end.
   void SetRest(const EvaluationKey& key, std::optional<int> rest_after);
   /// The evaluation rests, and workers with this checkpoint folder can go on with it.

@@ -77,11 +77,13 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
     t.SetProgress(
         7,
         {.state = CampaignState::kPaused, .reason = "asked", .iteration = 2, .pause_waived = true});
+    t.SetPriority(7, -3);
     t.Log(7, 99, "submitted");
   });
   Reader reader = Read();
   const auto record = reader.Campaign(7);
   ASSERT_TRUE(record.ok());
+  EXPECT_EQ(record->priority, -3);
   EXPECT_EQ(record->submitted.seed, campaign.seed);
   EXPECT_EQ(record->submitted.yaml, campaign.yaml);
   EXPECT_EQ(record->submitted.reading_rules, 5);
@@ -93,6 +95,20 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
   EXPECT_EQ(reader.Events(7)->front().what, "submitted");
   EXPECT_EQ(reader.Campaign(8).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(*reader.LastCampaign(), 7);
+}
+
+TEST_F(StoreTest, QuotasAreReplacedAndTakenAway) {
+  Write([](Transaction& t) {
+    t.SetQuota("ann", 3);
+    t.SetQuota("bob", 0);
+    t.SetQuota("ann", 5);
+  });
+  EXPECT_EQ(*Read().Quotas(), (std::map<std::string, int>{{"ann", 5}, {"bob", 0}}));
+  Write([](Transaction& t) {
+    t.SetQuota("ann", std::nullopt);
+    t.SetQuota("eve", std::nullopt);
+  });
+  EXPECT_EQ(*Read().Quotas(), (std::map<std::string, int>{{"bob", 0}}));
 }
 
 TEST_F(StoreTest, FilesOfAProgramStayWithTheirRunAndWithWhatReusesIt) {
