@@ -25,6 +25,7 @@
 #include "server/campaign/file/read_model.h"
 #include "server/campaign/file/read_noise_groups.h"
 #include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/file/read_resources.h"
 #include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/shared/map_reader.h"
 #include "server/campaign/file/shared/read_context.h"
@@ -210,6 +211,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadName(map, campaign);
     ReadModel(map, context, campaign);
     ReadInference(map, campaign);
+    ReadResources(map, campaign);
     const std::size_t sound = problems.size();
     ReadParameters(map, is_new, campaign);
     if (problems.size() == sound) {

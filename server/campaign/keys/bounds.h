@@ -22,6 +22,7 @@ inline constexpr Range kRecipeAspect{.min = 0.2, .max = 5};
 /// Of grains [m].
 inline constexpr Range kGrainSize{.min = 0, .max = 10, .min_open = true};
 
+inline constexpr int kMostThreadsOfRun = 1024;
 inline constexpr std::int64_t kMostSamples = 1'000'000;
 /// Chains of tmcmc.
 inline constexpr int kFewestChains = 20;

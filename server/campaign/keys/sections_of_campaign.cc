@@ -29,6 +29,8 @@ Section File() {
           {"early_stopping", AnyOf({OneWord({"off", "none", "false"}), MapOf("early_stopping")}),
            "off", "when runs that cannot count end"},
           {"failure", MapOf("failure"), "", "what becomes of runs that fail"},
+          {"resources", MapOf("resources"), "a slot of its worker",
+           "what one run needs, and may take at most"},
           {"budget", MapOf("budget"), "none", "what the campaign may cost"},
           {"seed", Seed(), "0", "of everything random"},
           {"lineage", MapOf("lineage"), "none",
@@ -104,6 +106,19 @@ Section FailureKeys() {
           }};
 }
 
+Section ResourceKeys() {
+  return {"resources",
+          "resources",
+          {
+              {"threads", Whole(1, kMostThreadsOfRun), "those of a slot", "that a run uses"},
+              {"memory", Text(), "that of a slot",
+               "resident, e.g. 1 GB; a run that comes to have more is ended"},
+              {"wall", Number("s", kPositive), "none",
+               "time of a run of the DEM; a program has `model.limits`"},
+              {"silence", Number("s", kPositive), "24 h", "time without a load step, likewise"},
+          }};
+}
+
 Section BudgetKeys() {
   return {"budget",
           "budget",
@@ -126,8 +141,8 @@ Section LineageKeys() {
 }  // namespace
 
 std::vector<Section> SectionsOfCampaign() {
-  return {File(),        Noise(),      NoiseGroup(), ModelErrorKeys(), EarlyStoppingKeys(),
-          FailureKeys(), BudgetKeys(), LineageKeys()};
+  return {File(),        Noise(),        NoiseGroup(), ModelErrorKeys(), EarlyStoppingKeys(),
+          FailureKeys(), ResourceKeys(), BudgetKeys(), LineageKeys()};
 }
 
 }  // namespace calib::campaign

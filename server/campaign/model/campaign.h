@@ -242,6 +242,18 @@ struct Failure {
   /// Share of diverged and unknown samples of an iteration above which it is paused.
   double pause_above = 0.25;
 };
+/// What one run needs of its worker and may take of it at most.
+struct Resources {
+  std::optional<int> threads{};     ///< that it uses, 1 to 1024; empty: those of its slots
+  std::optional<double> memory{};   ///< resident [bytes] > 0; empty: that of a slot, where known
+  std::optional<double> wall{};     ///< of a run of the DEM [s]; empty: any
+  std::optional<double> silence{};  ///< between two load steps of one [s]; empty: kLongestSilence
+};
+/// Of a run of the DEM [s], after which it hangs. Chosen: a load step of a million grains takes
+/// 6e6 contacts times 1e4 time steps at 5e6 contact updates per second (tests/bench), 3.3 h; a day
+/// is seven times that.
+inline constexpr double kLongestSilence = 86'400;
+
 /// No iteration begins that could exceed one of these; empty: no bound.
 struct Budget {
   std::optional<std::int64_t> model_evaluations;
@@ -291,6 +303,7 @@ struct Campaign {
   inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
+  Resources resources{};
   Budget budget;
   std::uint64_t seed = 0;
 };

@@ -389,6 +389,16 @@ INSTANTIATE_TEST_SUITE_P(
                 "e.g. [0.25, 0.5]"},
         Mistake{"NegativeSeed", "seed: 7", "seed: -7",
                 "c.yaml:40: seed: '-7' is not a whole number of at least 0"},
+        Mistake{"NoThreads", "seed: 7", "resources: {threads: 0}\nseed: 7",
+                "c.yaml:40: resources.threads: '0' is not a whole number from 1 to 1024"},
+        Mistake{"MemoryWithoutAUnit", "seed: 7", "resources: {memory: 4}\nseed: 7",
+                "c.yaml:40: resources.memory: '4' is no size above 0 with its unit: 500 MB, 4 GB, "
+                "2 GiB"},
+        Mistake{"NoSuchResource", "seed: 7", "resources: {cores: 4}\nseed: 7",
+                "c.yaml:40: resources.cores: is an unknown key; allowed: threads, memory, wall, "
+                "silence"},
+        Mistake{"NoTime", "seed: 7", "resources: {wall: 0 h}\nseed: 7",
+                "c.yaml:40: resources.wall: '0 h' is outside what is allowed: greater than 0 s"},
         Mistake{"ListForAMap", "failure: {attempts: 5, pause_above: 0.25}", "failure: [5, 0.25]",
                 "c.yaml:38: failure: is a list, expected a map of key: value"}),
     [](const auto& test) { return std::string(test.param.name); });

@@ -53,6 +53,19 @@ TEST(CampaignFile, ReadsEverySection) {
   EXPECT_THAT(outcome.files, ElementsAre("packing.txt", "data.txt", "validation.csv"));
 }
 
+TEST(CampaignFile, ResourcesAreWhatOneRunNeeds) {
+  const Resources none = Read(GoodYaml()).campaign.resources;
+  EXPECT_FALSE(none.threads || none.memory || none.wall || none.silence);
+  const Resources some =
+      Read(Spoiled("seed: 7",
+                   "resources: {threads: 2, memory: 1 GB, wall: 2 h, silence: 10 min}\nseed: 7"))
+          .campaign.resources;
+  EXPECT_EQ(some.threads, 2);
+  EXPECT_EQ(some.memory, 1e9);
+  EXPECT_EQ(some.wall, 7200);
+  EXPECT_EQ(some.silence, 600);
+}
+
 TEST(CampaignFile, TheShearForceAtUnloadingIsChosen) {
   EXPECT_EQ(Read(GoodYaml()).campaign.model.shear_unloading, dem::ShearUnloading::kAsPublished);
   const Campaign rescaled =
