@@ -1,5 +1,6 @@
 // calib-worker: the daemon on a compute node, or one evaluation with --once.
 #include <malloc.h>
+#include <pwd.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
@@ -13,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <thread>
 
 #include "dem/registry/catalog.h"
@@ -32,6 +34,7 @@ namespace {
 constexpr std::chrono::milliseconds kBenchmark{300};
 constexpr double kFewestGib = 0.001;
 constexpr double kMostGib = 1e6;
+constexpr double kGibibyte = 1 << 30;  // bytes
 
 std::string CpuModel() {
   std::ifstream info("/proc/cpuinfo");
@@ -47,6 +50,15 @@ std::string DefaultName() {
   std::array<char, 256> host{};
   gethostname(host.data(), host.size() - 1);
   return std::string(host.data()) + "-" + std::to_string(getpid());
+}
+
+/// Its number where it has no name.
+std::string AccountName() {
+  std::array<char, 16384> buffer{};
+  passwd entry{};
+  passwd* found = nullptr;
+  getpwuid_r(geteuid(), &entry, buffer.data(), buffer.size(), &found);
+  return found != nullptr ? std::string(found->pw_name) : std::to_string(geteuid());
 }
 
 /// Empty where the user has no home.
@@ -81,6 +93,7 @@ int main(int argc, char** argv) {
   int parent = -1;
   int drain_within_s = 0;
   double checkpoints_gib = 4;
+  std::optional<double> memory_gib;
   options.slots = 0;
   // Read by `calibctl doctor`, line by line.
   app.set_version_flag("--version",
@@ -103,6 +116,14 @@ int main(int argc, char** argv) {
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  app.add_option("--threads", options.threads,
+                 "threads that all evaluations may use together, an equal part a slot, where a "
+                 "campaign wants more than one of its slots' own [slots times threads per slot]")
+      ->check(CLI::Range(1, 1'048'576));
+  app.add_option("--memory-gib", memory_gib,
+                 "memory that all its runs may have together, an equal part a slot [that of the "
+                 "machine or of its control group]")
+      ->check(CLI::Range(kFewestGib, kMostGib));
   app.add_option("--name", options.name, "unique name [host name and process id]");
   app.add_option("--checkpoints", options.checkpoints,
                  "folder for runs that rest in breadth-first campaigns, shared by the workers of a "
@@ -195,13 +216,17 @@ int main(int argc, char** argv) {
   if (!options.checkpoints.empty()) {  // engines run elsewhere
     options.checkpoints = std::filesystem::absolute(options.checkpoints);
   }
-  options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * (1 << 30));
+  options.memory = memory_gib ? *memory_gib * kGibibyte : calib::worker::UsableMemory();
+  options.user = AccountName();
+  options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * kGibibyte);
   options.drain_within = std::chrono::seconds(drain_within_s);
   options.cpu = CpuModel();
   options.contact_updates_per_second = calib::worker::MeasureThroughput(kBenchmark);
-  spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",
-               options.name, options.slots, options.threads_per_slot,
-               options.contact_updates_per_second);
+  spdlog::info(
+      "worker name={} slots={} threads_per_slot={} memory_gib={:.4g} "
+      "contact_updates_per_second={:.4g}",
+      options.name, options.slots, options.threads_per_slot, options.memory / kGibibyte,
+      options.contact_updates_per_second);
   calib::worker::Worker worker(options);
   // It hears signals from here on; a server that is not there yet is waited for.
   calib::rpc::TellServiceManager(calib::rpc::kReady);

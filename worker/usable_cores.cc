@@ -1,6 +1,7 @@
 #include "worker/usable_cores.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -37,10 +38,11 @@ std::optional<double> QuotaOf(const std::string& group, bool unified) {
   return words.size() == 2 ? Paid(words[0], words[1]) : std::nullopt;
 }
 
-}  // namespace
-
-int UsableCores(const std::string& root, const std::string& own) {
-  double cores = std::max(1U, std::thread::hardware_concurrency());  // of the affinity
+// The smallest of what the control groups of a controller say, those around them included. In a
+// container the path may be that of the host.
+template <typename LimitOf>
+double LeastOfGroups(const std::string& root, const std::string& own, const std::string& controller,
+                     double least, const LimitOf& limit_of) {
   std::ifstream groups(own);
   for (std::string line; std::getline(groups, line);) {
     // 0::/path of version 2, N:cpu,cpuacct:/path of version 1.
@@ -48,17 +50,46 @@ int UsableCores(const std::string& root, const std::string& own) {
     if (parts.size() != 3) continue;
     const std::vector<std::string> kinds = absl::StrSplit(parts[1], ',');
     const bool unified = parts[1].empty();
-    if (!unified && std::find(kinds.begin(), kinds.end(), "cpu") == kinds.end()) continue;
-    const std::string mount = unified ? root : absl::StrCat(root, "/cpu");
-    // A group has no more than those around it. In a container the path may be that of the host.
+    if (!unified && std::find(kinds.begin(), kinds.end(), controller) == kinds.end()) continue;
+    const std::string mount = unified ? root : absl::StrCat(root, "/", controller);
     for (std::string path = parts[2];; path.erase(path.rfind('/'))) {
-      if (const auto quota = QuotaOf(mount + path, unified); quota.has_value()) {
-        cores = std::min(cores, *quota);
+      if (const std::optional<double> limit = limit_of(mount + path, unified); limit.has_value()) {
+        least = std::min(least, *limit);
       }
       if (path.empty() || path.rfind('/') == std::string::npos) break;
     }
   }
-  return std::max(1, static_cast<int>(cores));
+  return least;
+}
+
+std::optional<double> MemoryOf(const std::string& group, bool unified) {
+  double bytes = 0;
+  const std::string text = FirstLine(group + (unified ? "/memory.max" : "/memory.limit_in_bytes"));
+  return absl::SimpleAtod(text, &bytes) && bytes > 0 ? std::optional<double>(bytes) : std::nullopt;
+}
+
+// "MemTotal:  16337240 kB" in bytes.
+double MemoryOfMachine(const std::string& path) {
+  constexpr double kKibibyte = 1024;
+  std::ifstream file(path);
+  std::string name;
+  double number = 0;
+  file >> name >> number;
+  return name == "MemTotal:" ? number * kKibibyte : 0;
+}
+
+}  // namespace
+
+int UsableCores(const std::string& root, const std::string& own) {
+  const double of_affinity = std::max(1U, std::thread::hardware_concurrency());
+  return std::max(1, static_cast<int>(LeastOfGroups(root, own, "cpu", of_affinity, QuotaOf)));
+}
+
+double UsableMemory(const std::string& root, const std::string& own, const std::string& machine) {
+  const double all = MemoryOfMachine(machine);
+  if (all <= 0) return 0;
+  const double bytes = LeastOfGroups(root, own, "memory", all, MemoryOf);
+  return bytes < kMemoryGrain ? bytes : kMemoryGrain * std::floor(bytes / kMemoryGrain);
 }
 
 }  // namespace calib::worker

@@ -111,6 +111,9 @@ class Worker::Impl {
     hello.set_slots(options_.slots);
     hello.set_threads_per_slot(options_.threads_per_slot);
     hello.set_contact_updates_per_second(options_.contact_updates_per_second);
+    hello.set_threads(options_.threads);
+    hello.set_memory(options_.memory);
+    hello.set_user(rpc::Fitted(v1::NAME, options_.user));
     hello.set_engine_version(dem::EngineVersion());
     hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
     hello.set_cpu(rpc::Fitted(v1::NAME, options_.cpu));

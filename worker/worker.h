@@ -19,6 +19,9 @@ struct WorkerOptions {
   std::string name{};                     ///< unique among the server's workers
   int slots = 1;                          ///< attempts at a time, > 0
   int threads_per_slot = 1;               ///< > 0
+  int threads = 0;                        ///< that all runs may use; 0: those of the slots
+  double memory = 0;                      ///< that all runs may have [bytes]; 0: nobody knows
+  std::string user{};                     ///< account that it runs as
   double contact_updates_per_second = 0;  ///< speed of one thread, as measured
   std::string cpu{};                      ///< model name, recorded with every attempt
   std::string checkpoints{};  ///< absolute folder for runs that rest; empty: none are kept

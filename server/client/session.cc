@@ -52,6 +52,10 @@ std::string LastWords(const std::string& path) {
   return last_error.empty() ? last : last_error;
 }
 
+int CoresOfThisMachine() {
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
 }  // namespace
 
 Session::Session() = default;
@@ -203,7 +207,7 @@ std::string Session::Checkpoints() const {
 
 absl::Status Session::UseWorkers(std::optional<int> count) {
   if (!count) {
-    workers_as_host_ = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    workers_as_host_ = CoresOfThisMachine();
   }
   return StartWorkers(count.value_or(is_guest() ? 0 : workers_as_host_));
 }
@@ -218,6 +222,8 @@ absl::Status Session::StartWorkers(int count) {
                                        address_,
                                        "--slots",
                                        "1",
+                                       "--threads",  // a run that wants several gets them
+                                       absl::StrCat(CoresOfThisMachine()),
                                        "--name",
                                        absl::StrCat("local-", getpid(), "-", i),
                                        "--checkpoints",

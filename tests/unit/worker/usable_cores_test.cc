@@ -65,5 +65,21 @@ TEST_F(ControlGroups, LessThanACoreIsOneSlotAllTheSame) {
   EXPECT_EQ(Cores(), 1);
 }
 
+TEST_F(ControlGroups, MemoryIsThatOfTheMachineOrOfTheSmallestGroup) {
+  const auto memory = [this] { return UsableMemory(root_, root_ + "/own", root_ + "/meminfo"); };
+  EXPECT_EQ(memory(), 0) << "nobody knows";
+  Write("meminfo", "MemTotal:       16337240 kB\nMemFree: 1 kB\n");
+  Write("own", "0::/a/b\n");
+  EXPECT_EQ(memory(), 16'640e6) << "in whole grains";
+  Write("a/b/memory.max", "max\n");
+  EXPECT_EQ(memory(), 16'640e6);
+  Write("a/memory.max", "4000000000\n");
+  EXPECT_EQ(memory(), 3'840e6);
+  Write("own", "7:memory:/x\n");
+  Write("memory/x/memory.limit_in_bytes", "100000000\n");
+  EXPECT_EQ(memory(), 100e6) << "less than a grain as it is";
+  EXPECT_GT(UsableMemory(), 0) << "of this machine";
+}
+
 }  // namespace
 }  // namespace calib::worker
