@@ -374,6 +374,28 @@ absl::StatusOr<v1::CampaignStatus> Client::Cancel(const std::string& campaign) {
   return Call<v1::CampaignStatus>(impl_->connection, &Stub::Cancel, ControlOf(campaign));
 }
 
+absl::StatusOr<v1::CampaignStatus> Client::SetPriority(const std::string& campaign, int priority) {
+  v1::PriorityRequest request;
+  request.set_campaign(campaign);
+  request.set_request_id(rpc::RandomId());
+  request.set_priority(priority);
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::SetPriority, request);
+}
+
+absl::StatusOr<v1::OwnerShare> Client::SetQuota(const std::string& owner,
+                                                std::optional<int> slots) {
+  v1::QuotaRequest request;
+  request.set_owner(owner);
+  if (slots) request.set_slots(*slots);
+  return Call<v1::OwnerShare>(impl_->connection, &Stub::SetQuota, request);
+}
+
+absl::StatusOr<std::vector<v1::OwnerShare>> Client::ListShares() {
+  ASSIGN_OR_RETURN(const auto reply,
+                   Call<v1::ShareList>(impl_->connection, &Stub::ListShares, v1::SharesRequest()));
+  return std::vector<v1::OwnerShare>(reply.shares().begin(), reply.shares().end());
+}
+
 absl::Status Client::Delete(const std::string& campaign) {
   return Call<v1::DeleteReply>(impl_->connection, &Stub::Delete, ControlOf(campaign)).status();
 }

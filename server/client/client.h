@@ -83,6 +83,11 @@ class Client {
   absl::StatusOr<v1::CampaignStatus> Pause(const std::string& campaign);
   absl::StatusOr<v1::CampaignStatus> Resume(const std::string& campaign);
   absl::StatusOr<v1::CampaignStatus> Cancel(const std::string& campaign);
+  /// priority: from -100 to 100.
+  absl::StatusOr<v1::CampaignStatus> SetPriority(const std::string& campaign, int priority);
+  /// Slots that an owner's runs hold at most; empty: no bound.
+  absl::StatusOr<v1::OwnerShare> SetQuota(const std::string& owner, std::optional<int> slots);
+  absl::StatusOr<std::vector<v1::OwnerShare>> ListShares();
   absl::Status Delete(const std::string& campaign);
   absl::StatusOr<std::vector<v1::WorkerInfo>> ListWorkers();
   /// within: at most a day; runs that have not ended by then go on elsewhere. 0: they end.

@@ -274,8 +274,9 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
 }
 
 std::string StatusText(const v1::CampaignStatus& s) {
-  return fmt::format("{}  {}{}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
+  return fmt::format("{}  {}{}{}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
                      s.campaign(), s.name(), s.owner().empty() ? "" : ", of " + s.owner(),
+                     s.priority() == 0 ? "" : fmt::format(", priority {}", s.priority()),
                      client::ProgressText(s), s.model_evaluations(), Number(s.core_hours(), 3),
                      s.method()) +
          (s.has_kept_states()

@@ -31,7 +31,9 @@ namespace calib::ctl {
   VERB(Pause)             \
   VERB(Resume)            \
   VERB(Cancel)            \
+  VERB(Priority)          \
   VERB(Delete)            \
+  VERB(Quota)             \
   VERB(Workers)           \
   VERB(Backup)            \
   VERB(Prune)             \

@@ -75,6 +75,10 @@ void SetLimits(const campaign::ProgramLimits& limits, v1::ProgramLimits& message
   if (limits.silence) message.set_silence(*limits.silence);
 }
 
+/// Bytes that a run of the DEM may have where its campaign states none, on however many slots a
+/// node was cut into. Chosen: an engine has 40 MB before its run, one of 1e5 grains some hundred.
+constexpr double kLeastLimit = 256e6;
+
 // The columns that the observables of an experiment are read from.
 v1::ProgramTable TableOf(const campaign::ProgramTable& table,
                          const campaign::Experiment& experiment) {
@@ -265,6 +269,25 @@ std::string SpecDigest(v1::AttemptSpec spec) {
   spec.clear_experiment();
   spec.clear_threads();
   return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", rpc::BytesOf(spec)));
+}
+
+void SetResources(const campaign::Campaign& campaign, const RunShare& share, v1::Lease& lease) {
+  const campaign::Resources& needs = campaign.resources;
+  constexpr int kMostThreads = 4096;  // as a lease can say
+  const int threads = std::min(needs.threads.value_or(share.threads), kMostThreads);
+  std::optional<double> memory = needs.memory;
+  if (lease.has_program()) {
+    lease.mutable_program()->set_threads(threads);
+    v1::ProgramLimits& limits = *lease.mutable_program()->mutable_limits();
+    if (memory.has_value() && !limits.has_memory()) limits.set_memory(*memory);
+    return;
+  }
+  lease.mutable_spec()->set_threads(threads);
+  if (!memory.has_value() && share.memory > 0) memory = std::max(share.memory, kLeastLimit);
+  v1::ProgramLimits& limits = *lease.mutable_limits();
+  if (memory.has_value()) limits.set_memory(*memory);
+  if (needs.wall.has_value()) limits.set_wall(*needs.wall);
+  limits.set_silence(needs.silence.value_or(campaign::kLongestSilence));
 }
 
 std::string RunDigest(v1::Lease run) {

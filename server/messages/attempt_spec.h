@@ -26,6 +26,14 @@ v1::ProgramRun ProgramRunOf(const campaign::Campaign& campaign, int experiment,
 /// One evaluation as a lease has it, by whichever of them; without an attempt.
 v1::Lease LeaseOf(const campaign::Campaign& campaign, int experiment, const campaign::RunOf& run);
 
+/// What a worker has for a run.
+struct RunShare {
+  int threads = 1;    ///< > 0
+  double memory = 0;  ///< [bytes]; 0: nobody knows
+};
+/// Sets the threads and limits of a lease: what the campaign says, else what the worker has.
+void SetResources(const campaign::Campaign& campaign, const RunShare& share, v1::Lease& lease);
+
 /// SHA-256 of everything that determines the states: of a spec all but its name and thread count,
 /// and the version of the mechanics; of a program's run all but threads, limits and what is kept of
 /// it.

@@ -123,7 +123,8 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     }
   }
   for (const store::EvaluationRecord& evaluation : added) {
-    evaluations_[evaluation.key] = {.missing = MissingSteps(PathLength(evaluation.key.experiment)),
+    evaluations_[evaluation.key] = {.losses = evaluation.losses,
+                                    .missing = MissingSteps(PathLength(evaluation.key.experiment)),
                                     .rest_after = evaluation.rest_after,
                                     .held_in = evaluation.held_in,
                                     .digest = evaluation.digest};
@@ -221,6 +222,7 @@ void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest)
   by_digest_.emplace(digest, key);
   evaluation.digest = digest;
   of_other_mechanics_.erase(key);
+  evaluation.losses = 0;
   SetStatus(key, EvaluationStatus::kWaiting, 0);
   const auto arrived = arrived_.find(key.sample);
   if (arrived == arrived_.end()) return;
@@ -304,6 +306,19 @@ bool CampaignRun::WantsPlan() const {
 
 void CampaignRun::Planned(bool again) {
   planned_ = again ? std::nullopt : std::optional<std::size_t>(Results());
+}
+
+int CampaignRun::SlotsOf(const WorkerTable::Kind& kind) const {
+  if (!MayBeRunBy(kind.programs)) {
+    return 0;
+  }
+  const campaign::Resources& needs = definition_->campaign.resources;
+  const double threads = needs.threads.value_or(1);
+  double slots = std::max(1.0, std::ceil(threads * kind.slots / kind.threads));
+  if (needs.memory.has_value() && kind.memory > 0) {
+    slots = std::max(slots, std::ceil(*needs.memory * kind.slots / kind.memory));
+  }
+  return slots <= kind.slots ? static_cast<int>(slots) : 0;
 }
 
 std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,

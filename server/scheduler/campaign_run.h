@@ -18,6 +18,7 @@
 #include "absl/status/statusor.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "server/scheduler/definition.h"
+#include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/transitions.h"
 #include "server/store/reader.h"
 
@@ -58,9 +59,7 @@ class CampaignRun {
  public:
   struct Evaluation {
     store::EvaluationStatus status = store::EvaluationStatus::kWaiting;
-    int failures = 0;
-    /// Attempts of a program's run that were lost with their node since the server started; its
-    /// own failures are `failures`.
+    int failures = 0;  ///< see store::EvaluationRecord, as the next
     int losses = 0;
     MissingSteps missing{};
     std::optional<int> rest_after{};
@@ -84,6 +83,7 @@ class CampaignRun {
   std::shared_ptr<const Definition> shared_definition() const { return definition_; }
   const store::CampaignRecord& record() const { return record_; }
   store::CampaignProgress& progress() { return record_.progress; }
+  void SetPriority(int priority) { record_.priority = priority; }
   CampaignState state() const { return state_; }
   /// FAILED_PRECONDITION when the event is not allowed now; else changes state() and progress().
   absl::Status Apply(CampaignEvent event, const std::string& reason);
@@ -126,6 +126,9 @@ class CampaignRun {
       return name == "*" || name == program->command.front();
     });
   }
+  /// Slots that a run holds of such a worker, the fewest whose threads and memory are together what
+  /// it needs; 0: it has not as many, or may not run the campaign's program.
+  int SlotsOf(const WorkerTable::Kind& kind) const;
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
   std::string Refusal(const store::EvaluationKey& key, int load_step,
                       std::span<const double> observables) const;

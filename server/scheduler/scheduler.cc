@@ -6,8 +6,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
+#include "server/messages/attempt_spec.h"
 
 namespace calib::scheduler {
 
@@ -48,6 +50,10 @@ absl::Status Scheduler::Load() {
   ASSIGN_OR_RETURN(const auto last_campaign, reader.LastCampaign());
   ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   ASSIGN_OR_RETURN(const auto attempts, reader.ActiveAttempts());
+  ASSIGN_OR_RETURN(const auto quotas, reader.Quotas());
+  for (const auto& [owner, slots] : quotas) {
+    shares_.SetQuota(owner, slots);
+  }
   ticked_ = ports_.Now();
   last_attempt_ = last_attempt;
   last_campaign_ = last_campaign;
@@ -61,6 +67,7 @@ absl::Status Scheduler::Load() {
     const LeaseEntry lease{.attempt = attempt.id,
                            .key = attempt.key,
                            .worker = attempt.worker,
+                           .owner = run == nullptr ? "" : run->record().submitted.owner,
                            .shared = SharedDigest(attempt.key),
                            .started = ports_.Now()};
     if (run == nullptr) {
@@ -456,6 +463,7 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
         }
         for (const EvaluationKey& key : again) {
           transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
+          transaction.SetLosses(key, 0);
         }
       },
       reply);
@@ -499,6 +507,59 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
       ports_.Send(worker->session, std::move(message));
     }
   }
+}
+
+void Scheduler::SetPriority(const Priority& wish, const store::Store::Job& also,
+                            const Reply& reply) {
+  if (IsLoading(wish.campaign, [=, this] { SetPriority(wish, also, reply); })) {
+    return;
+  }
+  if (CampaignRun* run = FindRun(wish.campaign); run != nullptr) {
+    run->SetPriority(wish.priority);
+  }
+  ports_.Write(
+      [wish, also, now = ports_.UnixMs()](Transaction& transaction) {
+        transaction.SetPriority(wish.campaign, wish.priority);
+        transaction.Log(wish.campaign, now, absl::StrCat("priority ", wish.priority));
+        if (also) {
+          also(transaction);
+        }
+      },
+      [this, wish, reply](const absl::Status& status) {
+        StateChanged(wish.campaign);
+        reply(status);
+      });
+}
+
+void Scheduler::SetQuota(const std::string& owner, std::optional<int> slots, const Reply& reply) {
+  shares_.SetQuota(owner, slots);
+  ports_.Write(
+      [owner, slots, now = ports_.UnixMs()](Transaction& transaction) {
+        transaction.SetQuota(owner, slots);
+        transaction.Log(0, now,
+                        absl::StrCat("quota of ", owner, ": ",
+                                     slots.has_value() ? absl::StrCat(*slots, " slots") : "none"));
+      },
+      [this, reply](const absl::Status& status) {
+        WorkersChanged();
+        reply(status);
+        Dispatch();
+      });
+}
+
+std::vector<v1::OwnerShare> Scheduler::OwnerShares() const {
+  std::map<std::string, int> campaigns;
+  for (const std::string& owner : shares_.Owners()) campaigns[owner] = 0;
+  for (const auto& [id, run] : runs_) ++campaigns[run->record().submitted.owner];
+  std::vector<v1::OwnerShare> owners;
+  for (const auto& [owner, count] : campaigns) {
+    v1::OwnerShare& share = owners.emplace_back();
+    share.set_owner(owner);
+    share.set_campaigns(count);
+    share.set_held(shares_.OfOwner(owner).held);
+    if (const auto quota = shares_.Quota(owner)) share.set_slots(*quota);
+  }
+  return owners;
 }
 
 void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
@@ -562,27 +623,58 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
         run->Count(EvaluationStatus::kWaiting) + run->Count(EvaluationStatus::kRunning);
     live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
   }
-  const auto& program = run->definition().campaign.program;
-  if (program && run->Count(EvaluationStatus::kWaiting) > 0) {
+  if (run->Count(EvaluationStatus::kWaiting) > 0) {
     live.nobody_may = WhyNobodyMay(*run);
   }
   return live;
 }
 
 std::string Scheduler::WhyNobodyMay(const CampaignRun& run) const {
-  const std::string& command = run.definition().campaign.program->command.front();
+  const campaign::Campaign& campaign = run.definition().campaign;
+  const campaign::Resources& needs = campaign.resources;
+  const std::string& owner = run.record().submitted.owner;
+  const std::optional<int> quota = shares_.Quota(owner);
+  if (!campaign.program && !needs.threads && !needs.memory && quota != 0) {
+    return "";
+  }
   int connected = 0;
+  int allowed = 0;
+  int fewest = 0;  // slots of a run; 0: no worker has as many
   for (const auto& [name, worker] : workers_.all()) {
     if (worker.session == 0) continue;
     ++connected;
-    if (run.MayBeRunBy(worker.hello.programs())) return "";
+    const WorkerTable::Kind kind = WorkerTable::KindOf(worker.hello);
+    allowed += run.MayBeRunBy(kind.programs) ? 1 : 0;
+    const int slots = run.SlotsOf(kind);
+    if (slots > 0 && (fewest == 0 || slots < fewest)) fewest = slots;
   }
-  const bool brought = command.find('/') != std::string::npos && command.front() != '/';
-  return absl::StrCat(
-      connected == 0 ? absl::StrCat("no worker is connected; this campaign runs ", command)
-                     : absl::StrCat("none of ", connected, " connected workers may run ", command),
-      ": start one with --allow-command ",
-      brought ? "'*' (the program is brought along, so that it has to allow any)" : command);
+  if (quota.has_value() && *quota < std::max(1, fewest)) {
+    return absl::StrCat("the quota of ", owner, " is ", *quota,
+                        *quota == 1 ? " slot, and a run holds " : " slots, and a run holds ",
+                        std::max(1, fewest));
+  }
+  if (fewest > 0) {
+    return "";
+  }
+  if (campaign.program && allowed == 0) {
+    const std::string& command = campaign.program->command.front();
+    const bool brought = command.find('/') != std::string::npos && command.front() != '/';
+    return absl::StrCat(
+        connected == 0
+            ? absl::StrCat("no worker is connected; this campaign runs ", command)
+            : absl::StrCat("none of ", connected, " connected workers may run ", command),
+        ": start one with --allow-command ",
+        brought ? "'*' (the program is brought along, so that it has to allow any)" : command);
+  }
+  if (connected == 0) {
+    return "";
+  }
+  std::vector<std::string> wanted;
+  if (needs.threads) wanted.push_back(absl::StrCat(*needs.threads, " threads"));
+  if (needs.memory) wanted.push_back(absl::StrCat(1e-6 * *needs.memory, " MB"));
+  return absl::StrCat("none of ", connected, " connected workers has the ",
+                      absl::StrJoin(wanted, " and "),
+                      " that a run needs (resources): `calibctl workers` lists what they have");
 }
 
 double Scheduler::StatesPerSecond(std::int64_t campaign) {

@@ -17,6 +17,7 @@
 #include "server/scheduler/campaign_run.h"
 #include "server/scheduler/growth.h"
 #include "server/scheduler/leases/arrival_rate.h"
+#include "server/scheduler/leases/fair_share.h"
 #include "server/scheduler/leases/lease_table.h"
 #include "server/scheduler/leases/waiting_runs.h"
 #include "server/scheduler/leases/worker_table.h"
@@ -43,7 +44,7 @@ struct LiveStatus {
   LiveView view{};          ///< as it was computed last, aside
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
   double states_per_second = 0;
-  std::string nobody_may{};  ///< why no connected worker may run its program; empty: one may
+  std::string nobody_may{};  ///< why nobody may run what waits of it; empty: somebody may
 };
 
 /// When something of a campaign changed last, as versions of the scheduler; 0: not since it
@@ -111,6 +112,16 @@ class Scheduler {
   void Pause(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   void Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   void Cancel(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
+  /// Of the campaign among its owner's: who is leased first, see fair_share.h. In any state.
+  struct Priority {
+    std::int64_t campaign = 0;
+    int priority = 0;
+  };
+  void SetPriority(const Priority& wish, const store::Store::Job& also, const Reply& reply);
+  /// Slots that an owner's runs hold at most, see Shares::SetQuota.
+  void SetQuota(const std::string& owner, std::optional<int> slots, const Reply& reply);
+  /// Who has campaigns that are not over, holds slots or has a quota, in order of names.
+  std::vector<v1::OwnerShare> OwnerShares() const;
   /// Only campaigns that are over.
   void Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   /// Empty when the campaign is not live.
@@ -148,14 +159,16 @@ class Scheduler {
   absl::Status Admit(const v1::Hello& hello) const;
 
   // Work (scheduler_workers.cc)
-  /// Leases what waits, the first evaluation first, each to the worker with the most free slots
-  /// that may run it; one that rests where a worker, which is there, can go on with it, waits for
-  /// that.
+  /// Leases what waits, in the order of FairLine, each to the worker with the most free slots that
+  /// may run it; one that rests where a worker, which is there, can go on with it, waits for that.
   /// Not all in one turn where they are many: what workers say meanwhile is heard in between.
   void Dispatch();
-  /// The worker that should take runs of this group now; nullptr: none.
-  const WorkerEntry* WorkerFor(const WaitingRuns::Group& group);
-  void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
+  /// Enters the first of a group that does not wait for another campaign's run, if there is one.
+  void Enter(FairLine& line, const WaitingRuns::Group& group);
+  /// The worker that should take runs of this group now, or has too few free slots for one.
+  WorkerTable::Choice WorkerFor(const WaitingRuns::Group& group,
+                                const WorkerTable::Others& without);
+  void Grant(const WorkerTable::Choice& choice, const store::EvaluationKey& key);
   /// The worker that has spoken, or nullptr when its stream has been replaced.
   const WorkerEntry* Heard(std::int64_t session);
   /// Enters a lease; takes one out of all that knows of it, empty if there is none.
@@ -180,8 +193,10 @@ class Scheduler {
   /// The sample cannot count any more: stores what decided it and lets the worker stop.
   /// A program failed: done again, or set aside as unknown.
   void ModelFailed(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished);
-  /// Of a campaign with a program: why no worker that is connected may run it; empty: one may.
+  /// Why no worker that is connected may run it, or its owner none of its runs; empty: one may.
   std::string WhyNobodyMay(const CampaignRun& run) const;
+  /// What a lease of this worker holds by now.
+  void FitSlots(const v1::Hello& hello);
   void StopEarly(std::int64_t session, const LeaseEntry& lease,
                  std::vector<store::StateRecord> records);
   /// What is to be written of a batch, and acknowledged then.
@@ -273,6 +288,7 @@ class Scheduler {
   /// Attempts whose end is on its way to the disk: neither held nor refused. With the digest of
   /// what others may take then; empty: nothing.
   std::map<std::int64_t, std::string> ending_;
+  Shares shares_;  // of leases_
   WorkerTable workers_;
   std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over

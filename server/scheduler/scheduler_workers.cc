@@ -49,6 +49,13 @@ v1::Finished Because(std::int64_t attempt, const std::string& reason) {
   return finished;
 }
 
+Shares::Holding HoldingOf(const LeaseEntry& lease) {
+  return {.owner = lease.owner,
+          .campaign = lease.key.campaign,
+          .attempt = lease.attempt,
+          .slots = lease.slots};
+}
+
 std::string NameOf(const CampaignRun& run, const EvaluationKey& key) {
   return absl::StrCat(
       "sample ", key.sample, ", experiment ",
@@ -102,6 +109,7 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
     return admitted;
   }
   const Clock::time_point now = ports_.Now();
+  FitSlots(hello);
   if (const std::int64_t before = workers_.Connect(hello, session, leases_.Busy(hello.name()), now);
       before != 0) {
     ports_.Close(before, absl::AbortedError("the worker has opened another stream"));
@@ -133,6 +141,18 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   WorkersChanged();
   Dispatch();
   return absl::OkStatus();
+}
+
+// Those that are known from the store alone, or it has come back with other slots.
+void Scheduler::FitSlots(const v1::Hello& hello) {
+  for (const LeaseEntry& lease : leases_.OfWorker(hello.name())) {
+    const int slots = std::max(1, FindRun(lease.key.campaign)->SlotsOf(WorkerTable::KindOf(hello)));
+    if (slots != lease.slots) {
+      shares_.Return(HoldingOf(lease));
+      leases_.Resize(lease.attempt, slots);
+      shares_.Take(HoldingOf(*leases_.Find(lease.attempt, hello.name())));
+    }
+  }
 }
 
 void Scheduler::Disconnected(std::int64_t session) {
@@ -409,7 +429,7 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   const std::chrono::duration<double> elapsed = ports_.Now() - lease.started;
   v1::Finished finished = Because(lease.attempt, reason);
   if (const WorkerEntry* worker = workers_.OfSession(session); worker != nullptr) {
-    finished.set_core_seconds(elapsed.count() * worker->hello.threads_per_slot());
+    finished.set_core_seconds(elapsed.count() * worker->hello.threads_per_slot() * lease.slots);
   }
   v1::ServerMessage message;
   message.mutable_stop()->set_attempt(lease.attempt);
@@ -541,8 +561,8 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   }
   CampaignRun::Evaluation& evaluation = *run->Find(lease.key);
   const campaign::Campaign& campaign = run->definition().campaign;
-  // What a program itself failed at is counted apart from lost nodes.
-  const bool by_node = campaign.program && outcome != AttemptOutcome::kModelFailed;
+  // What an engine or program itself failed at is counted apart from lost nodes.
+  const bool by_node = outcome != AttemptOutcome::kModelFailed;
   evaluation.losses += counts_as_failure && by_node ? 1 : 0;
   const int failures = evaluation.failures + (counts_as_failure && !by_node ? 1 : 0);
   const int counted = by_node ? evaluation.losses : failures;
@@ -550,10 +570,11 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   const auto status = too_often ? EvaluationStatus::kFailed : EvaluationStatus::kWaiting;
   SetStatus(*run, lease.key, status, failures);
   const store::Store::Job end = [key = lease.key, status, failures, now = ports_.UnixMs(),
-                                 name = NameOf(*run, lease.key),
+                                 losses = evaluation.losses, name = NameOf(*run, lease.key),
                                  end = ToRecord(finished, outcome)](Transaction& t) {
     t.EndAttempt(end);
     t.SetEvaluation(key, status, end.reason, failures);
+    t.SetLosses(key, losses);
     t.Log(key.campaign, now,
           absl::StrCat(name, ": attempt ", end.id, " ", ToString(end.outcome), ": ", end.reason));
   };
@@ -571,20 +592,14 @@ void Scheduler::Dispatch() {
   if (waiting_.empty() || !workers_.AnyFree()) {
     return;
   }
-  std::set<std::pair<EvaluationKey, WaitingRuns::Group>> firsts;
-  const auto enter = [&](const WaitingRuns::Group& group) {
-    auto key = waiting_.First(group);
-    while (key.has_value() && WaitsForAnother(*key)) {
-      key = waiting_.First(group);
-    }
-    if (key.has_value()) {
-      firsts.emplace(*key, group);
-    }
-  };
+  FairLine line(shares_);
+  WorkerTable::Others held_free;  // for runs that need more slots than any worker has free
+  std::set<std::string> waits;    // owners of these
+  std::set<std::string> saves;    // who hold too much of their quota for their next run
   for (const WaitingRuns::Group& group : waiting_.Groups()) {
-    enter(group);
+    Enter(line, group);
   }
-  for (int granted = 0; !firsts.empty() && workers_.AnyFree();) {
+  for (int granted = 0; !line.empty() && workers_.AnyFree();) {
     if (granted == kGrantsPerTurn) {
       if (!std::exchange(dispatches_later_, true)) {
         ports_.Later([this] {
@@ -594,29 +609,59 @@ void Scheduler::Dispatch() {
       }
       return;
     }
-    const auto [key, group] = *firsts.begin();
-    firsts.erase(firsts.begin());
-    if (WaitsForAnother(key)) {  // since another group was leased the same
-      enter(group);
-    } else if (const WorkerEntry* worker = WorkerFor(group); worker != nullptr) {
-      Grant(*worker, key);
-      ++granted;
-      enter(group);
+    const FairLine::Place next = line.Take();
+    if (WaitsForAnother(next.first)) {  // since another group was leased the same
+      Enter(line, next.group);
+      continue;
     }
+    const WorkerTable::Choice choice = WorkerFor(next.group, held_free);
+    if (choice.worker == nullptr || saves.count(next.owner) > 0) {
+      continue;
+    }
+    if (choice.slots > shares_.Left(next.owner)) {
+      if (choice.slots <= shares_.Quota(next.owner)) saves.insert(next.owner);
+      continue;
+    }
+    if (choice.missing > 0) {  // smaller runs would take for ever what becomes free
+      if (choice.slots > 1 && waits.insert(next.owner).second) {
+        held_free.insert(choice.worker->hello.name());
+      }
+      continue;
+    }
+    Grant(choice, next.first);
+    ++granted;
+    line.Served(next.owner, next.first.campaign);
+    Enter(line, next.group);
   }
 }
 
-const WorkerEntry* Scheduler::WorkerFor(const WaitingRuns::Group& group) {
+void Scheduler::Enter(FairLine& line, const WaitingRuns::Group& group) {
+  auto key = waiting_.First(group);
+  while (key.has_value() && WaitsForAnother(*key)) {
+    key = waiting_.First(group);
+  }
+  if (key.has_value()) {
+    const store::CampaignRecord& record = FindRun(key->campaign)->record();
+    line.Enter({.first = *key,
+                .group = group,
+                .owner = record.submitted.owner,
+                .priority = record.priority});
+  }
+}
+
+WorkerTable::Choice Scheduler::WorkerFor(const WaitingRuns::Group& group,
+                                         const WorkerTable::Others& without) {
   const auto& [campaign, held_in] = group;
-  const auto may = [run = FindRun(campaign)](const WorkerTable::Programs& programs) {
-    return run->MayBeRunBy(programs);
+  const auto needs = [run = FindRun(campaign)](const WorkerTable::Kind& kind) {
+    return run->SlotsOf(kind);
   };
-  return held_in.empty() || !workers_.IsThere(held_in) ? workers_.Freest(may)
-                                                       : workers_.FreestAt(held_in, may);
+  return held_in.empty() || !workers_.IsThere(held_in) ? workers_.Freest(needs, without)
+                                                       : workers_.FreestAt(held_in, needs, without);
 }
 
 void Scheduler::Hold(const LeaseEntry& lease) {
   leases_.Grant(lease);
+  shares_.Take(HoldingOf(lease));
   workers_.SetBusy(lease.worker, leases_.Busy(lease.worker));
   UnderWay(lease.shared);
 }
@@ -624,6 +669,7 @@ void Scheduler::Hold(const LeaseEntry& lease) {
 std::optional<LeaseEntry> Scheduler::Release(std::int64_t attempt) {
   std::optional<LeaseEntry> lease = leases_.Release(attempt);
   if (lease.has_value()) {
+    shares_.Return(HoldingOf(*lease));
     workers_.SetBusy(lease->worker, leases_.Busy(lease->worker));
     NoLongerUnderWay(lease->shared);
   }
@@ -642,12 +688,15 @@ const WorkerEntry* Scheduler::Heard(std::int64_t session) {
   return worker;
 }
 
-void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
+void Scheduler::Grant(const WorkerTable::Choice& choice, const EvaluationKey& key) {
+  const WorkerEntry& worker = *choice.worker;
   CampaignRun& run = *FindRun(key.campaign);  // the queue holds live campaigns only
   const std::int64_t attempt = ++last_attempt_;
   Hold({.attempt = attempt,
         .key = key,
         .worker = worker.hello.name(),
+        .owner = run.record().submitted.owner,
+        .slots = choice.slots,
         .shared = SharedDigest(key),
         .started = ports_.Now()});
   const int failures = run.Find(key)->failures;
@@ -661,11 +710,11 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   *message.mutable_lease() =
       messages::LeaseOf(run.definition().campaign, key.experiment, run.RunOfSample(key.sample));
   message.mutable_lease()->set_attempt(attempt);
-  if (message.lease().has_program()) {
-    message.mutable_lease()->mutable_program()->set_threads(worker.hello.threads_per_slot());
-  } else {
-    message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
-  }
+  const double memory = worker.hello.memory() * choice.slots / worker.hello.slots();
+  messages::SetResources(
+      run.definition().campaign,
+      {.threads = worker.hello.threads_per_slot() * choice.slots, .memory = memory},
+      *message.mutable_lease());
   const CampaignRun::Evaluation& evaluation = *run.Find(key);
   if (message.lease().has_spec()) message.mutable_lease()->set_run(evaluation.digest);
   if (evaluation.rest_after.has_value()) {
@@ -749,6 +798,8 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
     info.set_connected(entry.session != 0);
     *info.mutable_programs() = entry.hello.programs();
     info.set_threads(entry.hello.threads_per_slot());
+    info.set_memory(entry.hello.memory());
+    info.set_user(entry.hello.user());
     info.set_left(entry.leaving && entry.session == 0);
     info.set_seconds_since_heard(std::chrono::duration<double>(ports_.Now() - entry.heard).count());
     for (const LeaseEntry& lease : leases_.OfWorker(name)) {
@@ -761,7 +812,7 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
                     .campaign.experiments[static_cast<std::size_t>(lease.key.experiment)]
                     .name));
     }
-    info.set_busy(info.running_size());
+    info.set_busy(entry.busy);
   }
   return infos;
 }

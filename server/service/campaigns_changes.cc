@@ -148,14 +148,12 @@ void CampaignsService::Control(const std::string& verb, const Caller& caller,
   act(*campaign, remember, finish);
 }
 
-grpc::ServerUnaryReactor* CampaignsService::ControlWithStatus(Context* context,
-                                                              const std::string& verb,
-                                                              const v1::ControlRequest* request,
+grpc::ServerUnaryReactor* CampaignsService::ControlWithStatus(Context* context, const Wish& wish,
                                                               v1::CampaignStatus* reply,
                                                               const Act& act) {
-  return Enter(context, Right::kChange, *request, [&](Unary* reactor, const Caller& caller) {
-    core_.Post([this, verb, request, reply, act, reactor, caller] {
-      Control(verb, caller, *request, act,
+  return Enter(context, Right::kChange, wish.request, [&](Unary* reactor, const Caller& caller) {
+    core_.Post([this, verb = wish.verb, about = wish.about, reply, act, reactor, caller] {
+      Control(verb, caller, about, act,
               [this, reactor, reply](const absl::StatusOr<std::int64_t>& campaign) {
                 if (campaign.ok()) {
                   FinishWithStatus(reactor, *campaign, reply);
@@ -170,7 +168,7 @@ grpc::ServerUnaryReactor* CampaignsService::ControlWithStatus(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::Pause(Context* context,
                                                   const v1::ControlRequest* request,
                                                   v1::CampaignStatus* reply) {
-  return ControlWithStatus(context, "pause", request, reply,
+  return ControlWithStatus(context, {"pause", *request, *request}, reply,
                            [this](std::int64_t campaign, const auto& also, const auto& done) {
                              core_.scheduler().Pause(campaign, also, done);
                            });
@@ -179,7 +177,7 @@ grpc::ServerUnaryReactor* CampaignsService::Pause(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::Resume(Context* context,
                                                    const v1::ControlRequest* request,
                                                    v1::CampaignStatus* reply) {
-  return ControlWithStatus(context, "resume", request, reply,
+  return ControlWithStatus(context, {"resume", *request, *request}, reply,
                            [this](std::int64_t campaign, const auto& also, const auto& done) {
                              core_.scheduler().Resume(campaign, also, done);
                            });
@@ -188,10 +186,70 @@ grpc::ServerUnaryReactor* CampaignsService::Resume(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::Cancel(Context* context,
                                                    const v1::ControlRequest* request,
                                                    v1::CampaignStatus* reply) {
-  return ControlWithStatus(context, "cancel", request, reply,
+  return ControlWithStatus(context, {"cancel", *request, *request}, reply,
                            [this](std::int64_t campaign, const auto& also, const auto& done) {
                              core_.scheduler().Cancel(campaign, also, done);
                            });
+}
+
+grpc::ServerUnaryReactor* CampaignsService::SetPriority(Context* context,
+                                                        const v1::PriorityRequest* request,
+                                                        v1::CampaignStatus* reply) {
+  v1::ControlRequest about;
+  about.set_campaign(request->campaign());
+  about.set_request_id(request->request_id());
+  return ControlWithStatus(
+      context, {absl::StrCat("priority ", request->priority()), *request, about}, reply,
+      [this, priority = request->priority()](std::int64_t campaign, const auto& also,
+                                             const auto& done) {
+        core_.scheduler().SetPriority({.campaign = campaign, .priority = priority}, also, done);
+      });
+}
+
+grpc::ServerUnaryReactor* CampaignsService::SetQuota(Context* context,
+                                                     const v1::QuotaRequest* request,
+                                                     v1::OwnerShare* reply) {
+  return Enter(
+      context, Right::kOperate, *request,
+      [this, request, reply](Unary* reactor, const Caller& caller) {
+        core_.Post([this, request, reply, reactor, caller] {
+          if (const absl::Status why = core_.WhyNotStore(); !why.ok()) {
+            reactor->Finish(rpc::ToGrpc(why));
+            return;
+          }
+          const std::optional<int> slots =
+              request->has_slots() ? std::optional<int>(request->slots()) : std::nullopt;
+          core_.scheduler().SetQuota(
+              request->owner(), slots,
+              [this, owner = request->owner(), reply, reactor, caller](const absl::Status& status) {
+                if (!status.ok()) {
+                  reactor->Finish(rpc::ToGrpc(status));
+                  return;
+                }
+                LogChange("quota", owner, caller);
+                v1::OwnerShare told;
+                told.set_owner(owner);
+                for (const v1::OwnerShare& share : core_.scheduler().OwnerShares()) {
+                  if (share.owner() == owner) told = share;
+                }
+                Answer(reactor, absl::StatusOr<v1::OwnerShare>(std::move(told)), reply);
+              });
+        });
+      });
+}
+
+grpc::ServerUnaryReactor* CampaignsService::ListShares(Context* context,
+                                                       const v1::SharesRequest* request,
+                                                       v1::ShareList* reply) {
+  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
+    core_.Post([this, reply, reactor] {
+      v1::ShareList list;
+      for (v1::OwnerShare& share : core_.scheduler().OwnerShares()) {
+        *list.add_shares() = std::move(share);
+      }
+      Answer(reactor, absl::StatusOr<v1::ShareList>(std::move(list)), reply);
+    });
+  });
 }
 
 grpc::ServerUnaryReactor* CampaignsService::Delete(Context* context,

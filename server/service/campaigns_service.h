@@ -52,6 +52,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   Unary* Pause(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
   Unary* Resume(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
   Unary* Cancel(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
+  Unary* SetPriority(Context*, const v1::PriorityRequest*, v1::CampaignStatus*) override;
+  Unary* SetQuota(Context*, const v1::QuotaRequest*, v1::OwnerShare*) override;
+  Unary* ListShares(Context*, const v1::SharesRequest*, v1::ShareList*) override;
   Unary* Delete(Context*, const v1::ControlRequest*, v1::DeleteReply*) override;
   Unary* ListWorkers(Context*, const v1::ListWorkersRequest*, v1::WorkerList*) override;
   Unary* DrainWorker(Context*, const v1::DrainRequest*, v1::WorkerInfo*) override;
@@ -98,8 +101,13 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// On the strand: what AddRuns() is to add, if it may.
   absl::StatusOr<scheduler::NewRuns> RunsToAdd(const v1::AddRunsRequest& request,
                                                const Caller& caller);
-  Unary* ControlWithStatus(Context* context, const std::string& verb,
-                           const v1::ControlRequest* request, v1::CampaignStatus* reply,
+  /// What is to be done with a campaign: its request_id is that of this verb and campaign.
+  struct Wish {
+    std::string verb;                          ///< with what it says besides
+    const google::protobuf::Message& request;  ///< as it came
+    v1::ControlRequest about;
+  };
+  Unary* ControlWithStatus(Context* context, const Wish& wish, v1::CampaignStatus* reply,
                            const Act& act);
 
   FinishedStatuses finished_;

@@ -249,6 +249,9 @@ Measured Core::Measure() const {
     measured.slots += worker.slots();
     measured.busy += worker.busy();
   }
+  for (const v1::OwnerShare& share : scheduler_.OwnerShares()) {
+    measured.held[share.owner()] = share.held();
+  }
   return measured;
 }
 

@@ -151,6 +151,7 @@ v1::CampaignStatus StatusWithout(const store::CampaignRecord& record, std::strin
   status.set_campaign(absl::StrCat("c", record.submitted.id));
   status.set_name(record.submitted.name);
   status.set_owner(record.submitted.owner);
+  status.set_priority(record.priority);
   status.set_state(ToString(record.progress.state));
   status.set_eta_seconds(-1);
   status.set_problem(std::move(problem));
@@ -205,6 +206,7 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   if (may_keep) {
     if (auto kept = finished->Find(record)) {
       kept->set_server_waits(waits);
+      kept->set_priority(record.priority);
       if (record.kept_states.has_value()) kept->set_kept_states(*record.kept_states);
       return *std::move(kept);
     }

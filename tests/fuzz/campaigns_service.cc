@@ -102,6 +102,9 @@ const std::vector<Entry>& Entries() {
       {{"AddRuns", Default<v1::AddRunsRequest>()}, Unary(&S::AddRuns)},
       {{"GetMetrics", Default<v1::MetricsRequest>()}, Unary(&S::GetMetrics)},
       {{"Prune", Default<v1::PruneRequest>()}, Unary(&S::Prune)},
+      {{"SetPriority", Default<v1::PriorityRequest>()}, Unary(&S::SetPriority)},
+      {{"SetQuota", Default<v1::QuotaRequest>()}, Unary(&S::SetQuota)},
+      {{"ListShares", Default<v1::SharesRequest>()}, Unary(&S::ListShares)},
       {{"Backup", Default<v1::BackupRequest>()}, Stream(&S::Backup)},
   };
   return entries;

@@ -15,6 +15,7 @@ void LeaseTable::Grant(LeaseEntry lease) {
   lease.named = lease.started;
   const auto [holder, is_new] = of_worker_.try_emplace(lease.worker);
   holder->second.attempts.insert(lease.attempt);
+  holder->second.slots += lease.slots;
   if (is_new) {
     holder->second.heard = lease.started;
     holder->second.look_at = lease.started + lease_;
@@ -56,6 +57,7 @@ std::optional<LeaseEntry> LeaseTable::Release(std::int64_t attempt) {
   LeaseEntry lease = std::move(node.mapped());
   const auto holder = of_worker_.find(lease.worker);
   holder->second.attempts.erase(attempt);
+  holder->second.slots -= lease.slots;
   if (holder->second.attempts.empty()) {
     looks_.erase({holder->second.look_at, lease.worker});
     of_worker_.erase(holder);
@@ -127,7 +129,13 @@ std::vector<LeaseEntry> LeaseTable::OfCampaign(std::int64_t campaign) const {
 
 int LeaseTable::Busy(const std::string& worker) const {
   const auto found = of_worker_.find(worker);
-  return found == of_worker_.end() ? 0 : static_cast<int>(found->second.attempts.size());
+  return found == of_worker_.end() ? 0 : found->second.slots;
+}
+
+void LeaseTable::Resize(std::int64_t attempt, int slots) {
+  LeaseEntry& lease = leases_.at(attempt);
+  of_worker_.at(lease.worker).slots += slots - lease.slots;
+  lease.slots = slots;
 }
 
 }  // namespace calib::scheduler

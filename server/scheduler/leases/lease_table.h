@@ -22,6 +22,8 @@ struct LeaseEntry {
   std::int64_t attempt = 0;
   store::EvaluationKey key{};
   std::string worker{};
+  std::string owner{};   ///< of its campaign
+  int slots = 1;         ///< that it holds, > 0
   std::string shared{};  ///< digest of what other campaigns may take from it; empty: nothing
   Clock::time_point started{};
   Clock::time_point named{};  ///< by its worker the last time, or started
@@ -58,12 +60,16 @@ class LeaseTable {
   /// In order of attempt, as below.
   std::vector<LeaseEntry> OfWorker(const std::string& worker) const;
   std::vector<LeaseEntry> OfCampaign(std::int64_t campaign) const;
+  /// Slots that a worker's leases hold.
   int Busy(const std::string& worker) const;
+  /// An attempt that is held holds so many slots from now on.
+  void Resize(std::int64_t attempt, int slots);
 
  private:
   using Attempts = std::set<std::int64_t>;
   struct Holder {
     Attempts attempts{};  ///< not empty
+    int slots = 0;        ///< of these
     Clock::time_point heard{};
     Clock::time_point look_at{};  ///< nothing of it ends before
   };

@@ -1,5 +1,6 @@
 #include "server/scheduler/leases/worker_table.h"
 
+#include <algorithm>
 #include <tuple>
 
 namespace calib::scheduler {
@@ -13,13 +14,18 @@ bool TakesWork(const WorkerEntry& entry) {
   return entry.session != 0 && !entry.draining && !entry.leaving && !entry.silent;
 }
 
+// Fewer than none where it came back with more leases than it has slots.
 int FreeSlots(const WorkerEntry& entry) { return entry.hello.slots() - entry.busy; }
 
-WorkerTable::Programs ProgramsOf(const WorkerEntry& entry) {
-  return {entry.hello.programs().begin(), entry.hello.programs().end()};
-}
-
 }  // namespace
+
+WorkerTable::Kind WorkerTable::KindOf(const v1::Hello& hello) {
+  return {.programs = {hello.programs().begin(), hello.programs().end()},
+          .slots = hello.slots(),
+          .threads = hello.threads() > 0 ? hello.threads()
+                                         : hello.slots() * std::max(1, hello.threads_per_slot()),
+          .memory = hello.memory()};
+}
 
 bool WorkerTable::Freer::operator()(const WorkerEntry* a, const WorkerEntry* b) const {
   return std::make_tuple(-FreeSlots(*a), std::cref(a->hello.name())) <
@@ -37,8 +43,9 @@ void WorkerTable::Index(const WorkerEntry& entry) {
   ++folder.workers;
   if (FreeSlots(entry) > 0) {
     folder.free.insert(&entry);
-    free_[ProgramsOf(entry)].insert(&entry);
+    free_slots_ += FreeSlots(entry);
   }
+  kinds_[KindOf(entry.hello)].insert(&entry);
 }
 
 void WorkerTable::Unindex(const WorkerEntry& entry) {
@@ -51,11 +58,12 @@ void WorkerTable::Unindex(const WorkerEntry& entry) {
   const auto folder = there_.find(entry.hello.checkpoints());
   if (FreeSlots(entry) > 0) {
     folder->second.free.erase(&entry);
-    const auto ranking = free_.find(ProgramsOf(entry));
-    ranking->second.erase(&entry);
-    if (ranking->second.empty()) {
-      free_.erase(ranking);
-    }
+    free_slots_ -= FreeSlots(entry);
+  }
+  const auto ranking = kinds_.find(KindOf(entry.hello));
+  ranking->second.erase(&entry);
+  if (ranking->second.empty()) {
+    kinds_.erase(ranking);
   }
   if (--folder->second.workers == 0) {
     there_.erase(folder);
@@ -172,28 +180,42 @@ const WorkerEntry* WorkerTable::OfSession(std::int64_t session) const {
   return found == by_session_.end() ? nullptr : found->second;
 }
 
-const WorkerEntry* WorkerTable::Freest(const May& may) const {
-  const WorkerEntry* freest = nullptr;
-  for (const auto& [programs, ranking] : free_) {
-    const WorkerEntry* first = *ranking.begin();
-    if ((freest == nullptr || Freer()(first, freest)) && may(programs)) {
-      freest = first;
+WorkerTable::Choice WorkerTable::Freest(const Needs& needs, const Others& without) const {
+  Choice best;
+  for (const auto& [kind, ranking] : kinds_) {
+    const int slots = needs(kind);
+    if (slots == 0 || slots > kind.slots) {
+      continue;
+    }
+    const auto first = std::find_if(ranking.begin(), ranking.end(), [&](const WorkerEntry* worker) {
+      return without.count(worker->hello.name()) == 0;
+    });
+    if (first == ranking.end()) {
+      continue;
+    }
+    const Choice choice{
+        .worker = *first, .slots = slots, .missing = std::max(0, slots - FreeSlots(**first))};
+    if (best.worker == nullptr || choice.missing < best.missing ||
+        (choice.missing == best.missing && Freer()(choice.worker, best.worker))) {
+      best = choice;
     }
   }
-  return freest;
+  return best;
 }
 
-const WorkerEntry* WorkerTable::FreestAt(const std::string& checkpoints, const May& may) const {
+WorkerTable::Choice WorkerTable::FreestAt(const std::string& checkpoints, const Needs& needs,
+                                          const Others& without) const {
   const auto folder = there_.find(checkpoints);
   if (folder == there_.end()) {
-    return nullptr;
+    return {};
   }
   for (const WorkerEntry* worker : folder->second.free) {
-    if (may(ProgramsOf(*worker))) {
-      return worker;
+    const int slots = needs(KindOf(worker->hello));
+    if (slots > 0 && slots <= FreeSlots(*worker) && without.count(worker->hello.name()) == 0) {
+      return {.worker = worker, .slots = slots};
     }
   }
-  return nullptr;
+  return {};
 }
 
 }  // namespace calib::scheduler

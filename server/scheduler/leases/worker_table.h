@@ -30,9 +30,19 @@ struct WorkerEntry {
 /// thread-safe.
 class WorkerTable {
  public:
-  /// Programs that a worker may run (Hello::programs).
-  using Programs = std::vector<std::string>;
-  using May = std::function<bool(const Programs&)>;
+  /// What decides on which runs a worker may take.
+  struct Kind {
+    std::vector<std::string> programs{};  ///< Hello::programs
+    int slots = 0;
+    int threads = 1;    ///< of all slots
+    double memory = 0;  ///< of all slots [bytes]; 0: not told
+    friend auto operator<=>(const Kind&, const Kind&) = default;
+  };
+  static Kind KindOf(const v1::Hello& hello);
+  /// Slots that a run would hold of such a worker, > 0; 0: it may not have it.
+  using Needs = std::function<int(const Kind&)>;
+  /// Who is passed over, by name.
+  using Others = std::set<std::string>;
 
   WorkerTable() = default;
   WorkerTable(const WorkerTable&) = delete;  // the indices point into it
@@ -63,12 +73,19 @@ class WorkerTable {
   /// By its stream, or nullptr when that has been replaced.
   const WorkerEntry* OfSession(std::int64_t session) const;
   /// Whether any worker has a free slot and takes work.
-  bool AnyFree() const { return !free_.empty(); }
-  /// The worker with the most free slots (ties: by name) among those that take work and whose
-  /// programs are such; nullptr: none. O(n) in the lists of programs that differ.
-  const WorkerEntry* Freest(const May& may) const;
-  /// The same among those with this checkpoint folder. O(n) in these.
-  const WorkerEntry* FreestAt(const std::string& checkpoints, const May& may) const;
+  bool AnyFree() const { return free_slots_ > 0; }
+  struct Choice {
+    const WorkerEntry* worker = nullptr;  ///< nullptr: none
+    int slots = 0;                        ///< that the run would hold
+    int missing = 0;                      ///< of these, of which its runs have to leave first
+  };
+  /// The worker with the most free slots (ties: by name) among those that take work and may have
+  /// such a run now; where there is none, the one of which fewest are missing. O(n) in the kinds
+  /// that differ and in the others.
+  Choice Freest(const Needs& needs, const Others& without = {}) const;
+  /// The same among those with this checkpoint folder that have a free slot. O(n) in these.
+  Choice FreestAt(const std::string& checkpoints, const Needs& needs,
+                  const Others& without = {}) const;
   /// Whether a worker with this checkpoint folder takes work, be it busy now.
   bool IsThere(const std::string& checkpoints) const { return there_.count(checkpoints) > 0; }
   const std::map<std::string, WorkerEntry>& all() const { return workers_; }
@@ -96,9 +113,10 @@ class WorkerTable {
 
   std::map<std::string, WorkerEntry> workers_;
   std::map<std::int64_t, WorkerEntry*> by_session_;
-  std::map<Programs, Ranking> free_;     // with free slots; no ranking is empty
+  std::map<Kind, Ranking> kinds_;        // that take work; no ranking is empty
   std::map<std::string, Folder> there_;  // by checkpoint folder; in each at least one takes work
   int slots_ = 0;
+  int free_slots_ = 0;  // of those that take work
 };
 
 }  // namespace calib::scheduler

@@ -78,6 +78,10 @@ std::string MetricsText(const Measured& m) {
   text.Begin("slots", "gauge", "Slots of connected workers by state.");
   text.Value("slots", m.busy, "state=\"busy\"");
   text.Value("slots", m.slots - m.busy, "state=\"free\"");
+  text.Begin("slots_held", "gauge", "Slots by the owner of the campaigns whose runs hold them.");
+  for (const auto& [owner, held] : m.held) {
+    text.Value("slots_held", held, absl::StrCat("owner=\"", Escaped(owner), "\""));
+  }
 
   const auto& written = m.store.written;
   text.Begin("runs_total", "counter", "Attempts that ended, by how.");

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <map>
 #include <string>
 
 #include "server/store/numbers.h"
@@ -16,14 +17,15 @@ struct Measured {
   bool store_waits = false;
 
   // ---- of the scheduler ----
-  std::size_t campaigns = 0;  ///< that are not over
-  std::size_t queued = 0;     ///< evaluations that wait for a slot
-  std::size_t planning = 0;   ///< campaigns whose next iteration is being computed
-  int workers = 0;            ///< connected
-  int draining = 0;           ///< of those
-  int silent = 0;             ///< neither connected nor left
-  int slots = 0;              ///< of connected workers
-  int busy = 0;               ///< of those
+  std::size_t campaigns = 0;          ///< that are not over
+  std::size_t queued = 0;             ///< evaluations that wait for a slot
+  std::size_t planning = 0;           ///< campaigns whose next iteration is being computed
+  int workers = 0;                    ///< connected
+  int draining = 0;                   ///< of those
+  int silent = 0;                     ///< neither connected nor left
+  int slots = 0;                      ///< of connected workers
+  int busy = 0;                       ///< of those
+  std::map<std::string, int> held{};  ///< slots by the owner of the runs
 
   store::StoreNumbers store{};
   store::Durations::Counts acknowledgements{};  ///< from a write to its answer

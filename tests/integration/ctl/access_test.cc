@@ -133,6 +133,30 @@ TEST_F(Access, RolesMayWhatTheyAreFor) {
     EXPECT_THAT(Refused(verb, "--tls viewer"), HasSubstr("this needs the role submitter"));
     EXPECT_THAT(Refused(verb, "--tls worker"), HasSubstr("may only take runs and report them"));
   }
+  for (const char* verb : {"priority c1 5", "priority c1 -100"}) {
+    EXPECT_THAT(Refused(verb, "--tls submitter"), HasSubstr("c1 belongs to ann"));
+    EXPECT_THAT(Refused(verb, "--tls viewer"), HasSubstr("this needs the role submitter"));
+  }
+  EXPECT_THAT(Refused("priority c9 5", "--tls operator"), HasSubstr("c9"));
+  EXPECT_EQ(Ask("priority c1 101", "--tls ann").code, 2);
+  EXPECT_EQ(Ask("priority c1 x", "--tls ann").code, 2);
+  EXPECT_EQ(Ask("priority c1 -7 --json", "--tls ann").json()["priority"], -7);
+  EXPECT_EQ(Ask("priority c1 8 --json", "--tls operator").json()["priority"], 8);
+  EXPECT_EQ(Ask("show c1 --json", "--tls viewer").json()["priority"], 8);
+  for (const char* role : {"ann", "viewer"}) {
+    EXPECT_THAT(Refused("quota ann --slots 3", std::string("--tls ") + role),
+                HasSubstr("this needs the role operator"));
+  }
+  EXPECT_EQ(Ask("quota --slots 3", "--tls operator").code, 2) << "whose";
+  EXPECT_EQ(Ask("quota ann --slots -1", "--tls operator").code, 2);
+  EXPECT_EQ(Ask("quota ann --slots many", "--tls operator").code, 2);
+  const auto share = [](const Json& slots) {
+    return Json{{"owner", "ann"}, {"slots", slots}, {"held", 0}, {"campaigns", 1}};
+  };
+  EXPECT_EQ(Ask("quota ann --slots 3 --json", "--tls operator").json(), share(3));
+  EXPECT_EQ(Ask("quota --json", "--tls viewer").json(), Json::array({share(3)}));
+  EXPECT_THAT(Refused("quota eve", "--tls viewer"), HasSubstr("eve has no campaign"));
+  EXPECT_EQ(Ask("quota ann --slots none --json", "--tls operator").json(), share(nullptr));
   EXPECT_EQ(Ask("list --json", "--tls viewer").json()[0]["state"], "queued") << "nothing changed";
   EXPECT_EQ(Ask("pause c1", "--tls ann").code, 0) << Read("err");
   EXPECT_EQ(Ask("resume c1", "--tls operator").code, 0) << Read("err");

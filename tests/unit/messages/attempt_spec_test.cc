@@ -40,6 +40,39 @@ TEST(SpecDigest, NamesWhatDeterminesTheStatesAndNothingElse) {
   EXPECT_NE(SpecDigest(other), digest);
 }
 
+TEST(SetResources, SaysWhatTheCampaignWantsAndElseWhatTheWorkerHas) {
+  campaign::Campaign campaign;
+  v1::Lease lease;
+  *lease.mutable_spec() = Spec();
+  const std::string digest = RunDigest(lease);
+  SetResources(campaign, {.threads = 3, .memory = 2e9}, lease);
+  EXPECT_EQ(lease.spec().threads(), 3);
+  EXPECT_EQ(lease.limits().memory(), 2e9);
+  SetResources(campaign, {.threads = 1, .memory = 1e6}, lease);
+  EXPECT_EQ(lease.limits().memory(), 256e6) << "no engine lives on less";
+  campaign.resources = {.threads = 2, .memory = 1e9};
+  SetResources(campaign, {.threads = 3, .memory = 2e9}, lease);
+  EXPECT_EQ(lease.spec().threads(), 2);
+  EXPECT_EQ(lease.limits().memory(), 1e9);
+  EXPECT_EQ(RunDigest(lease), digest) << "it has no part in what the run is";
+}
+
+TEST(SetResources, OfAProgramAreALimitWhereItHasNone) {
+  campaign::Campaign campaign;
+  v1::Lease lease;
+  lease.mutable_program()->add_command("yade");
+  SetResources(campaign, {.threads = 3, .memory = 2e9}, lease);
+  EXPECT_EQ(lease.program().threads(), 3);
+  EXPECT_FALSE(lease.program().limits().has_memory()) << "its own limits are the campaign's to say";
+  campaign.resources = {.memory = 1e9};
+  SetResources(campaign, {.threads = 3, .memory = 2e9}, lease);
+  EXPECT_EQ(lease.program().limits().memory(), 1e9);
+  lease.mutable_program()->mutable_limits()->set_memory(5e8);
+  SetResources(campaign, {.threads = 3, .memory = 2e9}, lease);
+  EXPECT_EQ(lease.program().limits().memory(), 5e8);
+  EXPECT_FALSE(lease.has_limits());
+}
+
 TEST(SpecDigest, NamesMaterialsAndMixtures) {
   dem::Scenario scenario;
   scenario.model.contact = "linear";

@@ -128,7 +128,8 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,
                       .file_name = "small.yaml",
                       .method = outcome.campaign.method,
                       .samples = LargestIteration(outcome.campaign),
-                      .max_iterations = outcome.campaign.max_iterations},
+                      .max_iterations = outcome.campaign.max_iterations,
+                      .owner = owner},
                      digests, "", {}, [&](const absl::StatusOr<std::string>& answer) {
                        id = *answer;
                        if (answered) answered();
@@ -149,6 +150,7 @@ std::int64_t SimulatedService::Connect(const std::string& worker, int slots,
   v1::Hello hello = testing::MatchingHello(worker, slots);
   hello.set_checkpoints("folder of " + worker);
   hello.mutable_attempts()->Add(held.begin(), held.end());
+  if (dress) dress(hello);
   const absl::Status status = scheduler_->Connected(++last_session_, hello);
   EXPECT_TRUE(status.ok()) << status;
   ports_->Run();

@@ -108,6 +108,10 @@ class SimulatedService {
   double core_seconds = 0;
   /// Runs that fail in RunToEnd() after their first states, as a program does; none.
   std::function<bool(const v1::AttemptSpec&)> fails;
+  /// Who submits.
+  std::string owner{};
+  /// What workers that connect say besides.
+  std::function<void(v1::Hello&)> dress{};
   /// Load steps that workers of RunToEnd() had to compute: without those of a checkpoint.
   int computed = 0;
 

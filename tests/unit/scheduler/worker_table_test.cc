@@ -17,10 +17,15 @@ v1::Hello Hello(const std::string& name, int slots) {
   return hello;
 }
 
-bool Any(const WorkerTable::Programs& /*programs*/) { return true; }
+int One(const WorkerTable::Kind& /*kind*/) { return 1; }
+
+// nullptr where it would have to wait.
+const WorkerEntry* FreeOf(const WorkerTable::Choice& choice) {
+  return choice.missing == 0 ? choice.worker : nullptr;
+}
 
 std::string Freest(const WorkerTable& workers) {
-  const WorkerEntry* worker = workers.Freest(Any);
+  const WorkerEntry* worker = FreeOf(workers.Freest(One));
   return worker == nullptr ? "" : worker->hello.name();
 }
 
@@ -70,7 +75,8 @@ TEST(WorkerTable, AThousandWorkersOfSixteenSlotsAreFilledInTurn) {
   for (int k = 0; k < kWorkers; ++k) {
     workers.Connect(Hello(std::to_string(k), kSlots), k + 1, 0, kStart);
   }
-  for (std::int64_t attempt = 0; const WorkerEntry* worker = workers.Freest(Any); ++attempt) {
+  for (std::int64_t attempt = 0; const WorkerEntry* worker = FreeOf(workers.Freest(One));
+       ++attempt) {
     EXPECT_EQ(worker->busy, attempt / kWorkers) << "nobody gets a run more than the others";
     const std::string name = worker->hello.name();
     leases.Grant({.attempt = attempt, .key = {}, .worker = name, .started = kStart});
@@ -89,20 +95,36 @@ TEST(WorkerTable, WhoMayRunAProgramIsFoundAmongThoseWhoMayNot) {
   };
   workers.Connect(with("a", 1, "yade"), 1, 0, kStart);
   workers.Connect(with("b", 9, "liggghts"), 2, 0, kStart);
-  const auto yade = [](const WorkerTable::Programs& programs) {
-    return programs == WorkerTable::Programs{"yade"};
+  const auto yade = [](const WorkerTable::Kind& kind) {
+    return kind.programs == std::vector<std::string>{"yade"} ? 1 : 0;
   };
-  ASSERT_NE(workers.Freest(yade), nullptr);
-  EXPECT_EQ(workers.Freest(yade)->hello.name(), "a");
+  ASSERT_NE(FreeOf(workers.Freest(yade)), nullptr);
+  EXPECT_EQ(FreeOf(workers.Freest(yade))->hello.name(), "a");
   EXPECT_EQ(Freest(workers), "b");
-  EXPECT_EQ(workers.FreestAt("folder of b", yade), nullptr);
-  EXPECT_NE(workers.FreestAt("folder of a", yade), nullptr);
+  EXPECT_EQ(workers.FreestAt("folder of b", yade).worker, nullptr);
+  EXPECT_NE(workers.FreestAt("folder of a", yade).worker, nullptr);
   workers.SetBusy("a", 1);
-  EXPECT_EQ(workers.Freest(yade), nullptr);
-  EXPECT_EQ(workers.FreestAt("folder of a", yade), nullptr);
+  EXPECT_EQ(FreeOf(workers.Freest(yade)), nullptr);
+  EXPECT_EQ(workers.FreestAt("folder of a", yade).worker, nullptr);
   EXPECT_TRUE(workers.IsThere("folder of a")) << "busy, but there";
   workers.Disconnect(1);
   EXPECT_FALSE(workers.IsThere("folder of a"));
+}
+
+TEST(WorkerTable, ARunOfSeveralSlotsIsToldWhereFewestAreMissing) {
+  WorkerTable workers;
+  workers.Connect(Hello("a", 4), 1, 3, kStart);
+  workers.Connect(Hello("b", 4), 2, 2, kStart);
+  workers.Connect(Hello("c", 2), 3, 0, kStart);
+  const auto three = [](const WorkerTable::Kind& /*kind*/) { return 3; };
+  EXPECT_EQ(workers.Freest(three).worker->hello.name(), "b") << "c will never have as many";
+  EXPECT_EQ(workers.Freest(three).missing, 1);
+  EXPECT_EQ(workers.Freest(three, {"b"}).worker->hello.name(), "a");
+  workers.SetBusy("a", 1);
+  EXPECT_EQ(workers.Freest(three).worker->hello.name(), "a");
+  EXPECT_EQ(workers.Freest(three).missing, 0);
+  const auto five = [](const WorkerTable::Kind& /*kind*/) { return 5; };
+  EXPECT_EQ(workers.Freest(five).worker, nullptr);
 }
 
 TEST(WorkerTable, NewStreamReplacesTheOldOne) {

@@ -33,7 +33,7 @@ TEST(Metrics, ABoundIsWithinItsOwnBucket) {
 }
 
 TEST(Metrics, EveryEndHasALineAndExpiredLeasesAreTheLostOnes) {
-  Measured measured{.engine = "a \"b\"\n", .slots = 5, .busy = 2};
+  Measured measured{.engine = "a \"b\"\n", .slots = 5, .busy = 2, .held = {{"ann", 2}}};
   measured.store.written.ended[static_cast<std::size_t>(store::AttemptOutcome::kLost)] = 7;
   measured.store.written.ended[static_cast<std::size_t>(store::AttemptOutcome::kCancelled)] = 3;
   const std::string text = MetricsText(measured);
@@ -41,7 +41,7 @@ TEST(Metrics, EveryEndHasALineAndExpiredLeasesAreTheLostOnes) {
        {"calib_build_info{engine=\"a \\\"b\\\" \"} 1\n", "calib_runs_total{end=\"completed\"} 0\n",
         "calib_runs_total{end=\"lost\"} 7\n", "calib_runs_total{end=\"cancelled\"} 3\n",
         "calib_lease_expiries_total 7\n", "calib_slots{state=\"busy\"} 2\n",
-        "calib_slots{state=\"free\"} 3\n"}) {
+        "calib_slots{state=\"free\"} 3\n", "calib_slots_held{owner=\"ann\"} 2\n"}) {
     EXPECT_THAT(text, HasSubstr(line));
   }
 }
