@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "calib/v1/engine.pb.h"
+#include "worker/program/run_limits.h"
 
 namespace calib::worker {
 namespace {
@@ -17,6 +18,11 @@ using Clock = std::chrono::steady_clock;
 
 /// How long a stop may wait to be heard. chosen: little beside a load step, and 50 looks a second
 constexpr std::chrono::milliseconds kBetweenLooks{20};
+/// Of its memory: as of programs (running_program.h).
+constexpr std::chrono::milliseconds kBetweenMemoryLooks{50};
+/// Share of its limit that an engine may have before a run begins: what runs before it have left
+/// there would be taken for its own. Chosen: half of it is left to the run.
+constexpr double kLeftByOthers = 0.5;
 /// For an engine whose input has ended, which has nothing to do.
 constexpr std::chrono::milliseconds kToLeave{1000};
 
@@ -32,11 +38,12 @@ v1::Finished Ended(v1::Finished::Outcome outcome, std::string reason) {
 /// One run in one process.
 class Engines::Talk {
  public:
-  Talk(Engine& engine, const EnginesOptions& options,
+  Talk(Engine& engine, const v1::ProgramLimits& limits, const EnginesOptions& options,
        const std::function<void(v1::State)>& on_state, const std::stop_token& stop,
        const std::stop_token& leave)
       : engine_(*engine.process),
         reader_(engine.reader),
+        limits_(limits),
         options_(options),
         on_state_(on_state),
         stop_(stop),
@@ -51,7 +58,7 @@ class Engines::Talk {
     cpu_before_ = engine_.cpu_seconds();
     engine_.Send(Framed(order));
     while (!finished_.has_value() && !engine_.end().has_value() && !reader_.broken()) {
-      if (IsUnwanted() && Stop()) break;
+      if ((IsUnwanted() && Stop()) || IsAtLimit()) break;
       engine_.Turn(kBetweenLooks, [this](std::string_view bytes) { reader_.Add(bytes); });
       for (v1::EngineWord word; !finished_.has_value() && reader_.Next(word); word.Clear()) {
         Hear(word);
@@ -62,6 +69,16 @@ class Engines::Talk {
 
  private:
   bool IsUnwanted() const { return stop_.stop_requested() || leave_.stop_requested(); }
+
+  bool IsAtLimit() {
+    const auto now = Clock::now();
+    limit_ = limits_.AtTime(now);
+    if (limit_.empty() && now >= next_look_) {
+      next_look_ = now + kBetweenMemoryLooks;
+      limit_ = limits_.AtMemory(engine_.Look().resident_bytes);
+    }
+    return !limit_.empty();
+  }
 
   /// Whether it has to be killed by now.
   bool Stop() {
@@ -80,9 +97,11 @@ class Engines::Talk {
     switch (word.word_case()) {
       case v1::EngineWord::kState:
         ++states_;
+        limits_.Progressed(Clock::now());
         on_state_(std::move(*word.mutable_state()));
         break;
       case v1::EngineWord::kWants: {
+        const auto asked = Clock::now();
         v1::EngineOrder order;
         if (auto content = options_.fetch(word.wants(), stop_); content.ok()) {
           order.mutable_content()->set_content(*std::move(content));
@@ -91,6 +110,7 @@ class Engines::Talk {
           order.mutable_content()->set_message(std::string(content.status().message()));
         }
         engine_.Send(Framed(order));
+        limits_.Waited(Clock::now() - asked);
         break;
       }
       case v1::EngineWord::kFinished:
@@ -105,13 +125,15 @@ class Engines::Talk {
   v1::Finished WithoutItsEnd() {
     const bool died = engine_.end().has_value();
     engine_.End(std::chrono::milliseconds(0), [](std::string_view) {});
+    const std::string after = absl::StrCat(" after ", states_, states_ == 1 ? " state" : " states");
     v1::Finished finished =
-        IsUnwanted() ? Ended(v1::Finished::OUTCOME_STOPPED, "stopped")
-        : died       ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
-                             absl::StrCat("the engine ended by ", InWords(*engine_.end()), " after ",
-                                          states_, states_ == 1 ? " state" : " states"))
-                     : Ended(v1::Finished::OUTCOME_MODEL_FAILED,
-                             "what the engine said is no message of ours");
+        IsUnwanted()      ? Ended(v1::Finished::OUTCOME_STOPPED, "stopped")
+        : !limit_.empty() ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                                  absl::StrCat("the engine ", limit_, ",", after))
+        : died            ? Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                                  absl::StrCat("the engine ended by ", InWords(*engine_.end()), after))
+                          : Ended(v1::Finished::OUTCOME_MODEL_FAILED,
+                                  "what the engine said is no message of ours");
     finished.set_words(engine_.words());
     finished.set_states(states_);
     finished.set_core_seconds(std::max(0.0, engine_.cpu_seconds() - cpu_before_));
@@ -120,6 +142,9 @@ class Engines::Talk {
 
   ChildProcess& engine_;
   FrameReader& reader_;
+  RunLimits limits_;
+  std::string limit_;  // that it came to; empty: none
+  Clock::time_point next_look_{};
   const EnginesOptions& options_;
   const std::function<void(v1::State)>& on_state_;
   const std::stop_token& stop_;
@@ -148,12 +173,12 @@ Engines::~Engines() {
 v1::Finished Engines::Evaluate(const v1::Lease& lease,
                                const std::function<void(v1::State)>& on_state,
                                const std::stop_token& stop, const std::stop_token& leave) {
-  auto engine = Take();
+  auto engine = Take(lease.limits());
   if (!engine.ok()) {
     return Ended(v1::Finished::OUTCOME_FAILED,
                  absl::StrCat("no engine could be started: ", engine.status().message()));
   }
-  v1::Finished finished = Talk(*engine, options_, on_state, stop, leave).Run(lease);
+  v1::Finished finished = Talk(*engine, lease.limits(), options_, on_state, stop, leave).Run(lease);
   if (const std::string words = engine->process->words(); !words.empty()) {
     spdlog::warn("engine attempt={} words=\"{}\"", lease.attempt(), words);
   }
@@ -161,7 +186,7 @@ v1::Finished Engines::Evaluate(const v1::Lease& lease,
   return finished;
 }
 
-absl::StatusOr<Engines::Engine> Engines::Take() {
+absl::StatusOr<Engines::Engine> Engines::Take(const v1::ProgramLimits& limits) {
   while (true) {
     Engine engine;
     {
@@ -172,7 +197,9 @@ absl::StatusOr<Engines::Engine> Engines::Take() {
     }
     engine.process->Turn(std::chrono::milliseconds(0),
                          [&engine](std::string_view bytes) { engine.reader.Add(bytes); });
-    if (!engine.process->end().has_value()) return engine;
+    const bool is_full = limits.has_memory() &&
+                         engine.process->Look().resident_bytes > kLeftByOthers * limits.memory();
+    if (!engine.process->end().has_value() && !is_full) return engine;
   }
   return Start();
 }

@@ -44,7 +44,8 @@ class Engines {
   /// Runs the spec of a lease on the calling thread; on_state gets every state as soon as it is
   /// reached. Never fails: what went wrong is the outcome, with its reason.
   ///   those of Evaluate() and EvaluateToRung(), and
-  ///   MODEL_FAILED  the process ended, with its signal, and `words`: the last that it printed
+  ///   MODEL_FAILED  the process ended, with its signal, or came to one of the lease's limits, and
+  ///                 was killed; `words`: the last that it printed
   ///   STOPPED       told to by `stop` or `leave`, even where it has to be killed for it
   ///   FAILED        this machine starts no process
   /// `leave`: a run that the lease gives a name to leaves a checkpoint, from which it goes on
@@ -59,7 +60,8 @@ class Engines {
     FrameReader reader{};  // of all runs: a specimen may be asked for while none is under way
   };
 
-  absl::StatusOr<Engine> Take();
+  /// One that waits, where it has left a run of such limits its memory.
+  absl::StatusOr<Engine> Take(const v1::ProgramLimits& limits);
   absl::StatusOr<Engine> Start();
   void GiveBack(Engine engine);
 

@@ -9,9 +9,9 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "fmt/format.h"
 #include "worker/program/request.h"
 #include "worker/program/run_files.h"
+#include "worker/program/run_limits.h"
 #include "worker/program/table_reader.h"
 
 namespace calib::worker {
@@ -30,8 +30,6 @@ constexpr std::int64_t kFewStates = 3;
 double SecondsSince(TalkClock::time_point begin) {
   return std::chrono::duration<double>(TalkClock::now() - begin).count();
 }
-
-std::string ShownSize(double bytes) { return fmt::format("{:.4g} MB", 1e-6 * bytes); }
 
 std::string LastLine(const std::string& words) {
   const std::string trimmed(absl::StripAsciiWhitespace(words));
@@ -133,13 +131,9 @@ class RunningProgram::Talk {
     const TreeUse use = child_.Look();
     report_.peak_memory = std::max(report_.peak_memory, use.resident_bytes);
     const v1::ProgramLimits& limits = program_.limits();
-    // A child between fork and exec counts its parent's pages for a moment: one look is not enough.
-    const bool was_above = memory_above_;
-    memory_above_ = limits.has_memory() && use.resident_bytes > limits.memory();
-    if (memory_above_ && was_above) {
+    if (std::string memory = limits_.AtMemory(use.resident_bytes); !memory.empty()) {
       takes_too_much_ = true;
-      limit_ = absl::StrCat("came to its memory limit: ", ShownSize(use.resident_bytes), " of ",
-                            ShownSize(limits.memory()));
+      limit_ = std::move(memory);
     }
     if (limits.has_disk() && now >= next_walk_) {
       const double bytes = BytesBelow(running_.folder());
@@ -152,28 +146,19 @@ class RunningProgram::Talk {
 
   void DiskLimit(double bytes) {
     takes_too_much_ = true;
-    limit_ = absl::StrCat("came to its disk limit: ", ShownSize(bytes), " of ",
-                          ShownSize(program_.limits().disk()));
+    limit_ = absl::StrCat("came to its disk limit: ", SizeInWords(bytes), " of ",
+                          SizeInWords(program_.limits().disk()));
   }
 
   bool IsAtLimit(TalkClock::time_point now) {
-    const v1::ProgramLimits& limits = program_.limits();
-    const auto since = [now](TalkClock::time_point then) {
-      return std::chrono::duration<double>(now - then).count();
-    };
-    if (limits.has_wall() && since(begin_) > limits.wall()) {
-      limit_ = absl::StrCat("came to its wall limit of ", NumberText(limits.wall()), " s");
-    } else if (limits.has_silence() && since(last_state_) > limits.silence()) {
-      limit_ = absl::StrCat("came to its silence limit: no state for ",
-                            NumberText(limits.silence()), " s");
-    }
+    if (std::string time = limits_.AtTime(now); !time.empty()) limit_ = std::move(time);
     return !limit_.empty();
   }
 
   void GiveStates() {
     for (v1::State& state : table_.has_value() ? table_->TakeStates() : reader_.TakeStates()) {
       if (!first_state_.has_value()) first_state_ = SecondsSince(begin_);
-      last_state_ = TalkClock::now();
+      limits_.Progressed(TalkClock::now());
       ++states_;
       on_state_(std::move(state));
     }
@@ -300,18 +285,17 @@ class RunningProgram::Talk {
     reader_.Add(bytes);
     GiveStates();
   };
+  RunLimits limits_{program_.limits()};
   std::optional<TableReader> table_;
   std::optional<TableFile> table_file_;
 
   const TalkClock::time_point begin_ = TalkClock::now();
-  TalkClock::time_point last_state_ = begin_;
   TalkClock::time_point next_look_ = begin_;
   TalkClock::time_point next_walk_ = begin_;
   std::optional<TalkClock::time_point> completed_at_;
   std::optional<double> first_state_;  // s since begin_
   std::int64_t states_ = 0;
   double cpu_before_ = 0;
-  bool memory_above_ = false;
   bool stopped_ = false;
   bool takes_too_much_ = false;  // memory or disk
   bool completed_ = false;       // when the run was over, whatever is said after

@@ -15,6 +15,7 @@
 #include "server/messages/attempt_spec.h"
 #include "tests/support/small_campaign.h"
 #include "worker/engine/evaluate.h"
+#include "worker/program/process_tree.h"
 
 namespace calib::worker {
 namespace {
@@ -143,6 +144,59 @@ TEST_F(EnginesOfAWorker, ThatDiedWhileItWaitedIsReplaced) {
   kill(Children().front(), SIGKILL);
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+}
+
+// Less than any engine has.
+TEST_F(EnginesOfAWorker, ThatTakeMoreMemoryThanTheyMayAreKilledAlone) {
+  Engines engines(Options());
+  const auto ignore = [](const v1::State& /*state*/) {};
+  v1::Lease small = lease_;
+  small.mutable_limits()->set_memory(1e6);
+  const auto ended = engines.Evaluate(
+      small, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  EXPECT_EQ(ended.outcome(), v1::Finished::OUTCOME_MODEL_FAILED);
+  EXPECT_NE(ended.reason().find("the engine came to its memory limit: "), std::string::npos)
+      << ended.reason();
+  EXPECT_NE(ended.reason().find(" of 1 MB, after "), std::string::npos) << ended.reason();
+  EXPECT_TRUE(Children().empty());
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+}
+
+TEST_F(EnginesOfAWorker, ThatHangAreKilledAlone) {
+  Engines engines(Options());
+  v1::Lease lease = lease_;
+  lease.mutable_limits()->set_silence(0.5);
+  const auto hangs = engines.Evaluate(
+      lease, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  EXPECT_EQ(hangs.outcome(), v1::Finished::OUTCOME_MODEL_FAILED);
+  EXPECT_NE(hangs.reason().find("the engine came to its silence limit: no state for 0.5 s, after"),
+            std::string::npos)
+      << hangs.reason();
+  lease.mutable_limits()->clear_silence();
+  lease.mutable_limits()->set_wall(0.5);
+  const auto endless = engines.Evaluate(
+      lease, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  EXPECT_NE(endless.reason().find("the engine came to its wall limit of 0.5 s, after"),
+            std::string::npos)
+      << endless.reason();
+  EXPECT_TRUE(Children().empty());
+}
+
+// What earlier runs have left in an engine is not taken for the next one's.
+TEST_F(EnginesOfAWorker, ThatIsHalfFullIsReplacedBeforeARunBegins) {
+  Engines engines(Options());
+  const auto ignore = [](const v1::State& /*state*/) {};
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  const pid_t first = Children().front();
+  const double resident = LookAtTree(first).resident_bytes;
+  ASSERT_GT(resident, 0);
+  lease_.mutable_limits()->set_memory(10 * resident);
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  EXPECT_EQ(Children(), std::vector<pid_t>{first}) << "it has room enough";
+  lease_.mutable_limits()->set_memory(1.6 * resident);
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  ASSERT_EQ(Children().size(), 1U);
+  EXPECT_NE(Children().front(), first);
 }
 
 class EnginesOfALongRun : public EnginesOfAWorker {
