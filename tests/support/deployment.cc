@@ -75,6 +75,7 @@ absl::StatusOr<std::string> Fingerprint(Client& client, const std::string& campa
     }
   }
   posterior->clear_core_hours();
+  posterior->clear_model_evaluations();  // what another campaign has run first is not run again
   std::string bytes = rpc::BytesOf(*posterior);
   for (v1::Sample& sample : *samples) {
     sample.clear_attempts();
