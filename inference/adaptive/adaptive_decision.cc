@@ -38,12 +38,6 @@ constexpr double kUntold = 0.8;
 // Standard error of a mean, in sd, that more runs are asked for to reach.
 constexpr double kWantedError = 0.1;
 
-int FirstCount(Index parameters, const AdaptiveOptions& options) {
-  const auto d = static_cast<int>(parameters);
-  return std::max(options.first_per_parameter * d,
-                  static_cast<int>(ResponseEmulator::LeastRuns(parameters)) + 1);
-}
-
 // Largest moves between two posteriors within the options' limits.
 bool HasSettled(const AdaptiveMemory& before, const AdaptiveMemory& after,
                 const AdaptiveOptions& options) {
@@ -120,31 +114,30 @@ std::string WhyUnfit(const ResponseQuality& quality) {
 }
 
 // What is uncertain, and what more runs would bring.
-std::string WhatIsUncertain(const AdaptivePosterior& posterior, Index runs) {
+std::string WhatIsUncertain(const AdaptivePosterior& posterior, Index runs,
+                            const std::vector<std::string>& names) {
+  const auto name = [&names](Index j) {
+    return names.empty() ? absl::StrCat("parameter ", j + 1) : names[static_cast<std::size_t>(j)];
+  };
   std::vector<std::string> untold, unsure;
   double factor = 1;
   for (Index j = 0; j < posterior.mean.size(); ++j) {
-    if (posterior.sd[j] > kUntold) untold.push_back(absl::StrCat(j + 1));
+    if (posterior.sd[j] > kUntold) untold.push_back(name(j));
     const double error = posterior.mean_error[j] / std::max(posterior.sd[j], 1e-300);
     factor = std::max(factor, std::pow(error / kWantedError, 2));
     if (error > kWantedError)
-      unsure.push_back(absl::StrFormat("%d (its mean to %.2f of its sd)", j + 1, error));
+      unsure.push_back(absl::StrFormat("%s (its mean to %.2f of its sd)", name(j), error));
   }
   std::string result;
   if (!untold.empty()) {
-    absl::StrAppend(&result, " The readings say next to nothing of parameter ",
-                    absl::StrJoin(untold, ", "), ".");
+    absl::StrAppend(&result, " The readings say next to nothing of ", absl::StrJoin(untold, ", "),
+                    ".");
   }
   if (!unsure.empty()) {
     absl::StrAppend(
-        &result, " By the emulator's error uncertain is parameter ", absl::StrJoin(unsure, ", "),
-        "; about ",
+        &result, " By the emulator's error uncertain is ", absl::StrJoin(unsure, ", "), "; about ",
         static_cast<int>(std::ceil(static_cast<double>(runs) * std::min(factor, 100.0))),
         " runs would bring all means to ", kWantedError, " sd.");
-  }
-  if (posterior.log_evidence_error > 0.3) {
-    absl::StrAppend(&result, absl::StrFormat(" The log evidence is known to %.2f.",
-                                             posterior.log_evidence_error));
   }
   return result;
 }
@@ -180,8 +173,14 @@ absl::Status AdaptiveOptions::Validate() const {
   return absl::OkStatus();
 }
 
+int FirstRunsOf(Index parameters, const AdaptiveOptions& options) {
+  const auto d = static_cast<int>(parameters);
+  return std::max(options.first_per_parameter * d,
+                  static_cast<int>(ResponseEmulator::LeastRuns(parameters)) + 1);
+}
+
 int LeastMaxRuns(Index parameters, const AdaptiveOptions& options) {
-  return FirstCount(parameters, options) + 2 * options.batch + options.verify;
+  return FirstRunsOf(parameters, options) + 2 * options.batch + options.verify;
 }
 
 absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
@@ -203,12 +202,12 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
     if (options.max_runs < least) {
       return Refused(absl::StrCat("max_runs is ", options.max_runs, ", and ", d,
                                   " parameters take ", least, " runs at least: ",
-                                  FirstCount(d, options), " that fill the prior, two batches of ",
+                                  FirstRunsOf(d, options), " that fill the prior, two batches of ",
                                   options.batch, " and ", options.verify, " that judge."),
                      false);
     }
     AdaptiveDecision result;
-    const int first = FirstCount(d, options);
+    const int first = FirstRunsOf(d, options);
     result.next = FirstRuns(problem, first, std::min(options.repeats, first / 3), options.seed);
     return result;
   }
@@ -264,7 +263,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   // An emulator that is not fit yet may be with more runs; without a signal it never will.
   if (!unfit.empty() && (ends || emulator->quality().explained < kLeastPredicted))
     return Refused(unfit, true);
-  const std::string uncertain = WhatIsUncertain(posterior, runs.rows());
+  const std::string uncertain = WhatIsUncertain(posterior, runs.rows(), options.names);
   if (result.verification.passed && settled && known && unfit.empty()) {
     result.posterior = std::move(posterior);
     return ended(AdaptiveStage::kConverged, uncertain.empty() ? "" : uncertain.substr(1));

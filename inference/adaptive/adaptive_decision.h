@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "inference/adaptive/adaptive_posterior.h"
@@ -29,6 +30,7 @@ struct AdaptiveOptions {
       0.15;  ///< a mean is known that the emulator leaves uncertain by less, in sd, > 0
   AdaptiveSamplingOptions sampling = {};  ///< `seed` and `number` are set by DecideAdaptive
   std::uint64_t seed = 0;
+  std::vector<std::string> names = {};  ///< d, of the parameters in sentences; or none
   absl::Status Validate() const;  ///< INVALID_ARGUMENT: field, what was found, what is allowed
 };
 
@@ -61,8 +63,8 @@ struct AdaptiveVerification {
 struct AdaptiveDecision {
   AdaptiveStage stage = AdaptiveStage::kFirst;
   AdaptiveBatch next{};  ///< no rows once ended
-  /// One or more sentences without names: why it ends, what is uncertain, what more runs would
-  /// bring; parameters by their index from 1. Empty while it goes on well.
+  /// One or more sentences: why it ends, what is uncertain, what more runs would bring. Empty while
+  /// it goes on well.
   std::string reason{};
   bool propose_filter = false;  ///< the emulator is not fit for this model: weights may be
   std::optional<AdaptivePosterior> posterior{};
@@ -71,6 +73,8 @@ struct AdaptiveDecision {
   AdaptiveMemory memory{};
 };
 
+/// Runs of the first batch of d parameters.
+int FirstRunsOf(Eigen::Index parameters, const AdaptiveOptions& options);
 /// Least max_runs with which a calibration of d parameters can end well: first runs, two batches,
 /// verification.
 int LeastMaxRuns(Eigen::Index parameters, const AdaptiveOptions& options);

@@ -106,16 +106,22 @@ class ExpectedVariance {
 
   // The integral of E_D[E[L | D]^2] with this candidate beside those taken, but for a factor.
   double Known(Index candidate) const {
-    Eigen::ArrayXd sum = weight_;
+    Eigen::ArrayXXd left(variance_.rows(), variance_.cols());
     for (Index k = 0; k < own_.size(); ++k) {
       const auto at = static_cast<std::size_t>(k);
       const double total = std::max(between_[at](candidate, candidate), 0.0) + run_[k];
-      const Eigen::ArrayXd left =
+      left.col(k) =
           (variance_.col(k) - with_points_[at].col(candidate).array().square() / total).max(0);
-      const Eigen::ArrayXd spread = 0.5 * (own_[k] + left) + first_.col(k) - left;
-      sum -= 0.5 * ((own_[k] + left) * spread).log() + 0.5 * square_.col(k) / spread;
     }
-    return LogSumExp(sum.matrix());
+    return LogSquare(left);
+  }
+
+  // Part of the variance that those taken are expected to end.
+  double Gain() const {
+    const double all = LogSquare(Eigen::ArrayXXd::Zero(first_.rows(), first_.cols()));
+    const double before = std::exp(LogSquare(first_) - all);
+    const double after = std::exp(LogSquare(variance_) - all);
+    return before < 1 ? std::clamp((after - before) / (1 - before), 0.0, 1.0) : 0;
   }
 
   void Take(Index candidate) {
@@ -131,6 +137,17 @@ class ExpectedVariance {
   }
 
  private:
+  // ln of the integral of the square of what is then expected of L, but for a factor, where data
+  // leave these variances.
+  double LogSquare(const Eigen::ArrayXXd& left) const {
+    Eigen::ArrayXd sum = weight_;
+    for (Index k = 0; k < own_.size(); ++k) {
+      const Eigen::ArrayXd spread = 0.5 * (own_[k] + left.col(k)) + first_.col(k) - left.col(k);
+      sum -= 0.5 * ((own_[k] + left.col(k)) * spread).log() + 0.5 * square_.col(k) / spread;
+    }
+    return LogSumExp(sum.matrix());
+  }
+
   Eigen::VectorXd own_, run_;
   Eigen::ArrayXXd square_, first_, variance_;  // points x q
   Eigen::ArrayXd weight_;                      // ln
@@ -233,7 +250,8 @@ AdaptiveBatch NextBatch(const AdaptiveProblem& problem, const AdaptiveRuns& runs
     }
   }
   AdaptiveBatch result{.parameters = Eigen::MatrixXd(count - runs.rows(), candidates.cols()),
-                       .packing = {}};
+                       .packing = {},
+                       .expected_gain = expected.Gain()};
   Balance balance(problem.packings, runs.packing);
   for (Index i = runs.rows(); i < count; ++i) {
     result.parameters.row(i - runs.rows()) =

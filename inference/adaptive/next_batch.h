@@ -16,6 +16,8 @@ namespace calib::inference {
 struct AdaptiveBatch {
   Eigen::MatrixXd parameters{};  ///< n x d, in the prior's units
   std::vector<int> packing{};    ///< n
+  /// Of NextBatch: part of the integral variance that is expected to go with it, [0, 1].
+  double expected_gain = 0;
 };
 
 /// What a batch is made of.

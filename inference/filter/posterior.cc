@@ -270,8 +270,8 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
   if (options.noise == NoiseMode::kGiven) {
     posterior.predictive_p = PredictiveP(data, ensemble.log_likelihood, log_weights, known);
   }
-  posterior.split_half =
-      SplitHalf(ensemble.parameters, log_weights, Halves(log_weights.size()), posterior.parameters);
+  posterior.split_half = HalvesDiffer(ensemble.parameters, log_weights, Halves(log_weights.size()),
+                                      posterior.parameters);
   posterior.frozen = ensemble.frozen;
   MarkFrozen(ensemble, posterior);
   posterior.warnings = Warnings(options, ensemble, posterior);

@@ -83,9 +83,9 @@ double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
   return p;
 }
 
-Eigen::VectorXd SplitHalf(const Eigen::MatrixXd& samples, const Eigen::VectorXd& log_weights,
-                          const std::vector<int>& halves,
-                          std::span<const ParameterSummary> parameters) {
+Eigen::VectorXd HalvesDiffer(const Eigen::MatrixXd& samples, const Eigen::VectorXd& log_weights,
+                             const std::vector<int>& halves,
+                             std::span<const ParameterSummary> parameters) {
   const Eigen::Index d = samples.cols();
   double mass[2] = {0, 0};
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2, d);

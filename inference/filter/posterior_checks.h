@@ -35,8 +35,8 @@ double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
 /// Posterior::split_half: for each of d parameters the difference of the weighted means of the
 /// samples (N x d) of half 0 and of half 1 over the parameter's sd; NaN where a half has no weight.
 /// halves: N numbers, 0 or 1; parameters: d, of all samples together.
-Eigen::VectorXd SplitHalf(const Eigen::MatrixXd& samples, const Eigen::VectorXd& log_weights,
-                          const std::vector<int>& halves,
-                          std::span<const ParameterSummary> parameters);
+Eigen::VectorXd HalvesDiffer(const Eigen::MatrixXd& samples, const Eigen::VectorXd& log_weights,
+                             const std::vector<int>& halves,
+                             std::span<const ParameterSummary> parameters);
 
 }  // namespace calib::inference
