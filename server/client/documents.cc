@@ -196,9 +196,8 @@ report::Comparison CompareView(const report::CampaignView& view,
 absl::StatusOr<Compared> CompareInFull(Client& client, const std::string& campaign,
                                        CampaignShelf* shelf) {
   ASSIGN_OR_RETURN(auto status, client.Show(campaign));
-  if (messages::RunsRowsOnly(status)) {
-    return absl::FailedPreconditionError(
-        messages::InfersNothing(campaign, *messages::MethodOf(status)));
+  if (status.infers_nothing()) {
+    return absl::FailedPreconditionError(messages::InfersNothing(campaign, status.method()));
   }
   const auto posterior = client.GetPosterior(campaign, std::nullopt);
   if (absl::IsFailedPrecondition(posterior.status())) {

@@ -17,6 +17,7 @@
 #include "server/client/progress.h"
 #include "server/client/standstill_notice.h"
 #include "server/messages/read_words.h"
+#include "server/methods/registry.h"
 
 namespace calib::client {
 
@@ -42,9 +43,9 @@ std::string WhatToDo(const v1::CampaignStatus& status) {
 
 // Runs that another verb made for a purpose of its own say nothing by themselves, and rows never.
 std::string WhyNoCalibration(const v1::CampaignStatus& status) {
-  const bool rows_only = messages::RunsRowsOnly(status);
+  const bool rows_only = status.infers_nothing();
   if (rows_only && status.parent().empty()) {
-    return messages::InfersNothing(status.campaign(), *messages::MethodOf(status));
+    return messages::InfersNothing(status.campaign(), status.method());
   }
   const bool trial = rows_only || messages::PurposeOf(status) == campaign::DerivedFor::kWarmFit;
   if (!trial || status.parent().empty()) return "";
@@ -237,7 +238,7 @@ absl::StatusOr<campaign::Campaign> Laboratory::Read(
     if (digest == parent.source.files().end()) return absl::NotFoundError("was not submitted");
     return session_.client().GetBlob(digest->second);
   };
-  auto read = campaign::ReadCampaign(yaml, parent.source.file_name(), reader);
+  auto read = campaign::ReadCampaign(methods::All(), yaml, parent.source.file_name(), reader);
   if (!read.problems.empty())
     return absl::InvalidArgumentError(campaign::ToString(read.problems.front()));
   return std::move(read.campaign);

@@ -7,6 +7,7 @@
 #include "calib/return_if_error.h"
 #include "proto/rpc/digest.h"
 #include "server/campaign/file/campaign_file.h"
+#include "server/methods/registry.h"
 
 namespace calib::client {
 
@@ -20,8 +21,8 @@ absl::StatusOr<campaign::Campaign> LoadCampaign(Client& client, const v1::Campai
   std::optional<std::uint64_t> seed;
   if (source.has_seed()) seed = source.seed();
   campaign::ReadOutcome outcome =
-      campaign::ReadCampaign(source.campaign_file(), source.file_name(), blobs, seed,
-                             campaign::StoredUnder(source.reading_rules()));
+      campaign::ReadCampaign(methods::All(), source.campaign_file(), source.file_name(), blobs,
+                             seed, campaign::StoredUnder(source.reading_rules()));
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this build cannot read the campaign as it was submitted: ",

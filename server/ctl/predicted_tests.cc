@@ -18,6 +18,7 @@
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/campaign/model/sha256.h"
+#include "server/methods/registry.h"
 
 namespace calib::ctl {
 namespace {
@@ -188,7 +189,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
   tests.experiments = list.items;
   // Whatever the experiments name is read once, so that problems are found here and files travel.
   const auto derived =
-      campaign::Derive(parent.source.campaign_file(),
+      campaign::Derive(methods::All(), parent.source.campaign_file(),
                        {.name = "prediction",
                         .lineage = {.parent = parent.status.campaign(),
                                     .purpose = ToString(campaign::DerivedFor::kPrediction)},
@@ -218,7 +219,8 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
     }
     return content;
   };
-  const campaign::ReadOutcome outcome = campaign::ReadCampaign(*derived, path, reader);
+  const campaign::ReadOutcome outcome =
+      campaign::ReadCampaign(methods::All(), *derived, path, reader);
   std::vector<std::string> lines;
   for (campaign::Problem problem : outcome.problems) {
     problem.line = 0;  // of a text the user has not written

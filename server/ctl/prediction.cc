@@ -14,6 +14,7 @@
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/excitation.h"
 #include "server/messages/read_words.h"
+#include "server/methods/registry.h"
 #include "server/report/views/discrepancies.h"
 #include "server/report/views/warnings.h"
 
@@ -365,7 +366,8 @@ absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
     }
     derivation.rows.push_back(std::move(row));
   }
-  ASSIGN_OR_RETURN(const auto text, campaign::Derive(parent.source.campaign_file(), derivation));
+  ASSIGN_OR_RETURN(const auto text,
+                   campaign::Derive(methods::All(), parent.source.campaign_file(), derivation));
   ASSIGN_OR_RETURN(const auto view, laboratory.Run(parent, text, "prediction", tests.files));
 
   Prediction prediction;

@@ -8,6 +8,7 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/model/identity.h"
 #include "server/campaign/model/sha256.h"
+#include "server/methods/registry.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
@@ -46,7 +47,7 @@ std::optional<SourceFiles> ReadSourceFiles(const std::string& file,
     if (content.ok()) source.contents[name] = *content;
     return content;
   };
-  source.outcome = campaign::ReadCampaign(source.yaml, file, remember, seed);
+  source.outcome = campaign::ReadCampaign(methods::All(), source.yaml, file, remember, seed);
   if (!source.outcome.problems.empty()) {
     Print(source.outcome.problems, json);
     return std::nullopt;

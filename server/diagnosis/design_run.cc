@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -50,7 +51,7 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
   campaign::Derivation derivation = DesignOf(base, chain.race());
   if (!other.empty()) derivation.name += absl::StrCat(", beside those of ", other);
   ASSIGN_OR_RETURN(const std::string text,
-                   campaign::Derive(base.source.campaign_file(), derivation));
+                   campaign::Derive(methods::All(), base.source.campaign_file(), derivation));
   ASSIGN_OR_RETURN(report::CampaignView design, laboratory.Design(base, text, kWhat));
   DesignedAnswer designed{
       .chain = kept, .campaign = design.status.campaign(), .parameters = derivation.parameters};

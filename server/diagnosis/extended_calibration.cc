@@ -154,11 +154,11 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
   int samples = campaign.samples;
   int iterations = campaign.max_iterations;
   int first = 0;  // runs that come first, beside those of the design
-  if (campaign::IsFilter(campaign.method)) {
+  if (campaign.method->weighs_samples()) {
     const PriorsInExtension priors(parent, model.effects);
     samples = kPerParameter * static_cast<int>(priors.size());
     iterations = kFewIterations * options.times;
-    plan.method = campaign::Method::kIterativeBayesianFilter;
+    plan.method = campaign.method->extended_by();
     plan.samples = samples;
     plan.iterations = iterations;
     if (options.design != nullptr) plan.given = RunsOfModel(parent, *options.design, model.effects);
@@ -189,7 +189,7 @@ bool IsFound(const report::CampaignView& extended, const NamedModel& model) {
   constexpr double kKnown = 0.3;
   // A right model at its posterior misses readings by their errors.
   constexpr double kRight = 1;
-  if (!campaign::IsFilter(extended.campaign.method) || extended.posterior.converged()) return true;
+  if (!extended.campaign.method->weighs_samples() || extended.posterior.converged()) return true;
   if (extended.posterior.posterior_from() == "none") return false;
   const double unknown = extended.posterior.posterior_from() == "emulator"
                              ? extended.posterior.emulator().unknown()

@@ -11,6 +11,7 @@
 #include "dem/registry/declared_effects.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/race.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -281,8 +282,10 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
     if (place.sd > 0)
       derivation.first_proposal->places[name] = {.center = place.center, .sd = kWider * place.sd};
   }
-  if (parent.campaign.precomputed) derivation.first_proposal.reset();  // nothing is run
-  return campaign::Derive(parent.source.campaign_file(), derivation);
+  if (parent.campaign.precomputed || !parent.campaign.method->takes_first_proposal()) {
+    derivation.first_proposal.reset();  // nothing is run, or all of the prior is
+  }
+  return campaign::Derive(methods::All(), parent.source.campaign_file(), derivation);
 }
 
 }  // namespace calib::diagnosis

@@ -35,11 +35,12 @@ struct ExtensionPlan {
   /// the parent's posterior.
   std::map<std::string, campaign::FirstProposal::Place> near{};
   bool held_out = true;                             ///< false: held-out experiments stay closed
-  std::optional<campaign::Method> method{};         ///< of the parent's family; as the parent
+  std::optional<std::string> method{};              ///< of the parent's family; as the parent
   std::optional<int> samples{};                     ///< as the parent
   std::optional<int> iterations{};                  ///< as the parent
   std::optional<std::int64_t> model_evaluations{};  ///< budget; as the parent
-  /// Runs of the extended model that it learns from beside its samples, of an iterative filter.
+  /// Runs of the extended model that it learns from beside its samples, where its method takes
+  /// rows.
   std::vector<campaign::Derivation::Row> given{};
 };
 

@@ -16,6 +16,7 @@
 #include "server/diagnosis/plan_grid.h"
 #include "server/diagnosis/plan_words.h"
 #include "server/diagnosis/test_plans.h"
+#include "server/methods/registry.h"
 #include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
@@ -60,7 +61,7 @@ absl::StatusOr<std::string> RivalsText(const Rival& rival,
   std::vector<campaign::Derivation::Row> rows;
   rows.reserve(points.size());
   for (const auto& values : points) rows.push_back({.like = like, .values = values});
-  return campaign::Derive(rival.view->source.campaign_file(),
+  return campaign::Derive(methods::All(), rival.view->source.campaign_file(),
                           {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
                            .lineage = {.parent = parent, .purpose = "next_experiment"},
                            .effects = rival.effects,

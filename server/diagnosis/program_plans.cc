@@ -10,6 +10,7 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
 #include "server/campaign/file/text/yaml_text.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -135,7 +136,7 @@ absl::StatusOr<PlanScreen> PlansOfProgram(client::Laboratory& laboratory,
   }
   ASSIGN_OR_RETURN(
       const std::string text,
-      campaign::Derive(base.source.campaign_file(),
+      campaign::Derive(methods::All(), base.source.campaign_file(),
                        {.name = absl::StrCat(base.campaign.name, ": next experiment"),
                         .lineage = {.parent = base.status.campaign(), .purpose = "next_experiment"},
                         .experiments = entries,

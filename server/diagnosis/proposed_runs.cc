@@ -8,6 +8,7 @@
 #include "server/campaign/file/derive.h"
 #include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/stage_rows.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 
@@ -27,7 +28,7 @@ absl::StatusOr<ProposedRuns> ProposedRuns::Open(client::Laboratory& laboratory,
   derivation.lineage.purpose = campaign::ToString(campaign::DerivedFor::kNextExperiment);
   derivation.experiments = {test.entry};
   ASSIGN_OR_RETURN(const std::string text,
-                   campaign::Derive(base.source.campaign_file(), derivation));
+                   campaign::Derive(methods::All(), base.source.campaign_file(), derivation));
   ASSIGN_OR_RETURN(report::CampaignView design,
                    laboratory.Design(base, text, kWhatOfTest, {{test.file, test.data}}));
   return ProposedRuns(

@@ -12,6 +12,7 @@
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/reading_effects.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -327,7 +328,7 @@ campaign::Derivation DesignOf(const report::CampaignView& view, const Race& race
 
 campaign::Campaign CampaignOfDesign(const campaign::Campaign& base, const Race& race) {
   campaign::Campaign design = base;
-  design.method = campaign::Method::kDesign;
+  design.method = methods::All().Of(campaign::ChosenBy::kRequest);
   design.race = race.Names();
   for (campaign::CalibratedParameter& parameter : RacingParameters(race))
     design.parameters.push_back(std::move(parameter));

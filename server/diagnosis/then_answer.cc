@@ -16,6 +16,7 @@
 #include "server/diagnosis/proposed_runs.h"
 #include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/setting_plans.h"
+#include "server/methods/registry.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -131,7 +132,7 @@ class SecondInquiry {
     ASSIGN_OR_RETURN(
         const std::string text,
         campaign::Derive(
-            base_.source.campaign_file(),
+            methods::All(), base_.source.campaign_file(),
             {.name = "next", .lineage = {}, .held_out = false, .experiments = {test_.entry}}));
     auto read = laboratory_.Read(base_, text, {{test_.file, test_.data}});
     if (!read.ok()) return NotPlanned(std::string(read.status().message()));

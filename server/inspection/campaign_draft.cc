@@ -17,6 +17,7 @@
 #include "server/campaign/file/text/suggestion.h"
 #include "server/inspection/header_words.h"
 #include "server/inspection/numbers.h"
+#include "server/methods/registry.h"
 
 namespace calib::inspection {
 namespace {
@@ -358,9 +359,8 @@ absl::StatusOr<std::string> CampaignDraft(const std::vector<InspectedFile>& file
       "  friction_coefficient: {prior: uniform, min: 0.1, max: 1.0}\n"
       "  rolling_resistance.friction: {prior: uniform, min: 0.0, max: 0.5}\n"
       "experiments:\n",
-      experiments,
-      "noise: given\ninference: {method: iterative_bayesian_filter, samples: ", kSamples,
-      ", max_iterations: ", kIterations, "}\nseed: 1\n");
+      experiments, "noise: given\ninference: {method: ", methods::All().standard()->name(),
+      ", samples: ", kSamples, ", max_iterations: ", kIterations, "}\nseed: 1\n");
 }
 
 }  // namespace calib::inspection

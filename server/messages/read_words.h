@@ -22,17 +22,9 @@ inline bool IsOver(const v1::CampaignStatus& status) {
 inline std::optional<campaign::Phase> PhaseOf(const v1::CampaignStatus& status) {
   return campaign::ValueOf(campaign::kPhaseWords, status.phase());
 }
-inline std::optional<campaign::Method> MethodOf(const v1::CampaignStatus& status) {
-  return campaign::ValueOf(campaign::kMethodWords, status.method());
-}
-/// True where runs are made and nothing is inferred from them by the server.
-inline bool RunsRowsOnly(const v1::CampaignStatus& status) {
-  const auto method = MethodOf(status);
-  return method && campaign::RunsRowsOnly(*method);
-}
-/// What is said of such a campaign to who asks for what it has found.
-inline std::string InfersNothing(const std::string& campaign, campaign::Method method) {
-  return absl::StrCat("campaign ", campaign, " runs the rows of its ", ToString(method),
+/// What is said of a campaign that infers nothing to who asks for what it has found.
+inline std::string InfersNothing(const std::string& campaign, const std::string& method) {
+  return absl::StrCat("campaign ", campaign, " runs the rows of its ", method,
                       " and infers nothing: see samples, states and export");
 }
 inline std::optional<campaign::DerivedFor> PurposeOf(const v1::CampaignStatus& status) {

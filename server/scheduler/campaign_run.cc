@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/messages/attempt_spec.h"
-#include "server/scheduler/decisions.h"
-#include "server/scheduler/early_stopping.h"
+#include "server/planning/decisions.h"
+#include "server/planning/early_stopping.h"
 
 namespace calib::scheduler {
 
@@ -25,7 +25,7 @@ bool IsForGood(EvaluationStatus status) {
 
 }  // namespace
 
-CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
+CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const planning::Definition> definition)
     : id_(id), definition_(std::move(definition)) {
   for (std::size_t e = 0; e < definition_->campaign.experiments.size(); ++e) {
     auto& positions = positions_.emplace_back();
@@ -45,10 +45,11 @@ void CampaignRun::FactoriseErrors() {
   }
 }
 
-absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& reader,
+absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(const campaign::MethodList& methods,
+                                                               store::Reader& reader,
                                                                std::int64_t id) {
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(id));
-  ASSIGN_OR_RETURN(auto definition, LoadDefinition(reader, record.submitted));
+  ASSIGN_OR_RETURN(auto definition, planning::LoadDefinition(methods, reader, record.submitted));
   std::unique_ptr<CampaignRun> run(new CampaignRun(id, std::move(definition)));
   run->FactoriseErrors();
   run->record_ = record;
@@ -112,7 +113,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     return !IsOfRunningIteration(entry.first) && open.count(entry.first) == 0;
   });
   for (const store::SampleRecord& sample : samples) {
-    if (!samples_.emplace(sample.sample, ToRun(definition_->campaign, sample)).second) {
+    if (!samples_.emplace(sample.sample, planning::ToRun(definition_->campaign, sample)).second) {
       continue;
     }
     if (!std::isnan(sample.stop_below)) {
@@ -168,7 +169,7 @@ absl::Status CampaignRun::AddStates(const absl::StatusOr<std::vector<store::Stat
   return absl::OkStatus();
 }
 
-absl::Status CampaignRun::Apply(CampaignEvent event, const std::string& reason) {
+absl::Status CampaignRun::Apply(planning::CampaignEvent event, const std::string& reason) {
   ASSIGN_OR_RETURN(const auto next, Next(state_, event));
   state_ = next;
   record_.progress.state = state_;
@@ -300,7 +301,7 @@ std::size_t CampaignRun::Results() const {
 
 bool CampaignRun::WantsPlan() const {
   return AllTerminal() ||
-         (DecidesWhileRunning(*definition_) &&
+         (planning::DecidesWhileRunning(*definition_) &&
           record_.progress.phase == campaign::Phase::kCalibrating && planned_ != Results());
 }
 
@@ -418,7 +419,7 @@ bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
       known(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  return BestPossible(*likelihood_, known) < threshold->second;
+  return planning::BestPossible(*likelihood_, known) < threshold->second;
 }
 
 std::vector<EvaluationKey> CampaignRun::WaitingBeside(const EvaluationKey& key) const {
@@ -443,7 +444,7 @@ std::set<int> CampaignRun::OpenSamples() const {
 // last that have ended, as many as the first iteration has samples, stand for the running one.
 std::set<int> CampaignRun::EndedForPause() const {
   const std::set<int> open = OpenSamples();
-  const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
+  const bool overlaps = definition_->campaign.method->chooses_while_running();
   const auto most = static_cast<std::size_t>(record_.submitted.samples);
   std::set<int> ended;
   for (auto it = samples_.rbegin(); it != samples_.rend(); ++it) {
@@ -454,7 +455,7 @@ std::set<int> CampaignRun::EndedForPause() const {
 }
 
 int CampaignRun::Diverged() const {
-  const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
+  const bool overlaps = definition_->campaign.method->chooses_while_running();
   const std::set<int> ended = overlaps ? EndedForPause() : std::set<int>{};
   std::set<int> samples;
   for (const EvaluationStatus status : {EvaluationStatus::kDiverged, EvaluationStatus::kUnknown}) {

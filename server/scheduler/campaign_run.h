@@ -17,12 +17,14 @@
 
 #include "absl/status/statusor.h"
 #include "inference/data/gaussian_likelihood.h"
-#include "server/scheduler/definition.h"
+#include "server/planning/definition.h"
+#include "server/planning/transitions.h"
 #include "server/scheduler/leases/worker_table.h"
-#include "server/scheduler/transitions.h"
 #include "server/store/reader.h"
 
 namespace calib::scheduler {
+
+using campaign::CampaignState;
 
 /// How the running iteration does, from the load steps that every sample has reached.
 struct LiveView {
@@ -67,7 +69,8 @@ class CampaignRun {
     std::string digest{};
   };
 
-  static absl::StatusOr<std::unique_ptr<CampaignRun>> Load(store::Reader& reader, std::int64_t id);
+  static absl::StatusOr<std::unique_ptr<CampaignRun>> Load(const campaign::MethodList& methods,
+                                                           store::Reader& reader, std::int64_t id);
   /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk
   /// in it.
   absl::Status Reload(store::Reader& reader);
@@ -79,14 +82,14 @@ class CampaignRun {
   absl::Status Extend(store::Reader& reader);
 
   std::int64_t id() const { return id_; }
-  const Definition& definition() const { return *definition_; }
-  std::shared_ptr<const Definition> shared_definition() const { return definition_; }
+  const planning::Definition& definition() const { return *definition_; }
+  std::shared_ptr<const planning::Definition> shared_definition() const { return definition_; }
   const store::CampaignRecord& record() const { return record_; }
   store::CampaignProgress& progress() { return record_.progress; }
   void SetPriority(int priority) { record_.priority = priority; }
   CampaignState state() const { return state_; }
   /// FAILED_PRECONDITION when the event is not allowed now; else changes state() and progress().
-  absl::Status Apply(CampaignEvent event, const std::string& reason);
+  absl::Status Apply(planning::CampaignEvent event, const std::string& reason);
 
   Evaluation* Find(const store::EvaluationKey& key);
   /// Keys with this status, in order.
@@ -150,8 +153,8 @@ class CampaignRun {
   void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
   /// Samples of the running iteration of which an evaluation diverged or is unknown, and those with
-  /// nothing left to run; of surrogate_msrs the last that have ended, as many as its first
-  /// iteration has.
+  /// nothing left to run; where points are chosen one by one the last that have ended, as many as
+  /// its first iteration has.
   int Diverged() const;
   int Done() const;
 
@@ -165,7 +168,7 @@ class CampaignRun {
   std::function<LiveView()> Look();
 
  private:
-  CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition);
+  CampaignRun(std::int64_t id, std::shared_ptr<const planning::Definition> definition);
   void FactoriseErrors();
   /// Compares digests, which takes tens of microseconds each: once, where the campaign is read.
   void FindOtherMechanics();
@@ -187,7 +190,7 @@ class CampaignRun {
   std::size_t Results() const;
 
   std::int64_t id_;
-  std::shared_ptr<const Definition> definition_;
+  std::shared_ptr<const planning::Definition> definition_;
   store::CampaignRecord record_;
   CampaignState state_ = CampaignState::kQueued;
   /// Of running evaluations; empty with ess_target.

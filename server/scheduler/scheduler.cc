@@ -1,4 +1,4 @@
-// Campaigns: taking them up, their states, and what they do next. Workers: scheduler_workers.cc.
+// Campaigns: taking them up, their states, and what they do next. Workers: scheduler_links.cc.
 #include "server/scheduler/scheduler.h"
 
 #include <algorithm>
@@ -10,6 +10,7 @@
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
 #include "server/messages/attempt_spec.h"
+#include "server/planning/phases/plan_next.h"
 
 namespace calib::scheduler {
 
@@ -30,11 +31,11 @@ bool MayPass(const absl::Status& error) {
 }
 
 // One campaign that asks for too much must not end the service, now and at each start.
-absl::StatusOr<Plan> ReadAndPlan(Ports& ports, const Definition& definition,
-                                 const store::CampaignRecord& record) {
+absl::StatusOr<planning::Plan> ReadAndPlan(Ports& ports, const planning::Definition& definition,
+                                           const store::CampaignRecord& record) {
   try {
     ASSIGN_OR_RETURN(auto reader, ports.Read());
-    return PlanNext(definition, record, reader);
+    return planning::PlanNext(definition, record, reader);
   } catch (const std::bad_alloc&) {
     return absl::FailedPreconditionError(absl::StrCat(
         "what follows from ", record.submitted.samples, " samples of ",
@@ -59,7 +60,8 @@ absl::Status Scheduler::Load() {
   last_campaign_ = last_campaign;
   for (const store::CampaignRecord& record : campaigns) {
     if (!IsOver(record.progress.state)) {
-      TakeUp(record.submitted.id, CampaignRun::Load(reader, record.submitted.id));
+      TakeUp(record.submitted.id,
+             CampaignRun::Load(*options_.methods, reader, record.submitted.id));
     }
   }
   for (const store::ActiveAttempt& attempt : attempts) {
@@ -112,14 +114,14 @@ store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
 
 void Scheduler::PauseIfOfOtherMechanics(CampaignRun& run) {
   const std::map<EvaluationKey, std::string> others = run.OfOtherMechanics();
-  if (!IsLeasable(run.state()) || others.empty()) {
+  if (!planning::IsLeasable(run.state()) || others.empty()) {
     return;
   }
   if (!run.HasBegun()) {  // there is nothing that could be mixed
     Write(run.id(), BeginAnew(run, others), [](const absl::Status&) {});
     return;
   }
-  SetState(run, CampaignEvent::kPause,
+  SetState(run, planning::CampaignEvent::kPause,
            absl::StrCat("begun by a program with other mechanics than this one's, version ",
                         dem::EngineVersion(),
                         ": resume runs what is open with these, so that the ensemble is of both; "
@@ -139,15 +141,24 @@ void Scheduler::TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<Cam
   if (absl::IsNotFound(run.status())) {  // deleted since
     return;
   }
-  // One campaign that cannot be read must not keep the others from going on.
-  const store::CampaignProgress failed{.state = CampaignState::kFailed,
-                                       .reason = std::string(run.status().message())};
+  // It keeps the others from nothing, and waits for a program that can read it: it was accepted
+  // once.
+  SetUnreadable(campaign, CampaignState::kPaused, std::string(run.status().message()), nullptr,
+                [](const absl::Status&) {});
+}
+
+void Scheduler::SetUnreadable(std::int64_t campaign, CampaignState state, const std::string& reason,
+                              const store::Store::Job& also, const Reply& reply) {
+  unreadable_[campaign] = reason;
+  if (IsOver(state)) unreadable_.erase(campaign);
   ports_.Write(
       [=, now = ports_.UnixMs()](Transaction& transaction) {
-        transaction.SetProgress(campaign, failed);
-        transaction.Log(campaign, now, absl::StrCat("failed: ", failed.reason));
+        if (also) also(transaction);
+        transaction.SetState(campaign, state, reason);
+        transaction.Log(campaign, now, absl::StrCat(ToString(state), ": ", reason));
       },
-      [](const absl::Status&) {});
+      reply);
+  StateChanged(campaign);
 }
 
 void Scheduler::TakeUpNow(std::int64_t campaign) {
@@ -160,7 +171,7 @@ void Scheduler::LoadAside(std::int64_t campaign) {
   ports_.Load([this, campaign]() -> std::function<void()> {
     auto reader = ports_.Read();
     auto loaded = std::make_shared<absl::StatusOr<std::unique_ptr<CampaignRun>>>(
-        reader.ok() ? CampaignRun::Load(*reader, campaign) : reader.status());
+        reader.ok() ? CampaignRun::Load(*options_.methods, *reader, campaign) : reader.status());
     return [this, campaign, loaded] {
       TakeUp(campaign, std::move(*loaded));
       if (CampaignRun* run = FindRun(campaign); run != nullptr) {
@@ -308,13 +319,15 @@ CampaignRun* Scheduler::LiveRun(std::int64_t campaign, const Reply& reply) {
     reply(again_.count(campaign) > 0
               ? absl::UnavailableError(absl::StrCat("campaign c", campaign,
                                                     " cannot be read now; try again in a moment"))
+          : unreadable_.count(campaign) > 0
+              ? absl::FailedPreconditionError(unreadable_.at(campaign))
               : absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
   }
   return run;
 }
 
 void Scheduler::Enqueue(CampaignRun& run) {
-  if (!IsLeasable(run.state())) {
+  if (!planning::IsLeasable(run.state())) {
     waiting_.TakeAll(run.id());
     return;
   }
@@ -330,7 +343,7 @@ void Scheduler::Enqueue(CampaignRun& run) {
 void Scheduler::Offer(CampaignRun& run, int sample) {
   for (const EvaluationKey& key : run.OfSample(sample)) {
     const CampaignRun::Evaluation& evaluation = *run.Find(key);
-    if (evaluation.status == EvaluationStatus::kWaiting && IsLeasable(run.state()) &&
+    if (evaluation.status == EvaluationStatus::kWaiting && planning::IsLeasable(run.state()) &&
         run.IsItsTurn(key)) {
       waiting_.Put(key, evaluation.held_in);
     } else {
@@ -384,7 +397,7 @@ void Scheduler::Submit(store::NewCampaign submitted, std::map<std::string, std::
       });
 }
 
-void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
+void Scheduler::SetState(CampaignRun& run, planning::CampaignEvent event, const std::string& reason,
                          const store::Store::Job& also, const Reply& reply) {
   if (absl::Status status = run.Apply(event, reason); !status.ok()) {
     reply(status);
@@ -420,7 +433,7 @@ void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, cons
   if (run == nullptr) {
     return;
   }
-  SetState(*run, CampaignEvent::kPause, "asked for", also, reply);
+  SetState(*run, planning::CampaignEvent::kPause, "asked for", also, reply);
 }
 
 void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
@@ -450,7 +463,7 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
     }
   }
   SetState(
-      *run, CampaignEvent::kResume,
+      *run, planning::CampaignEvent::kResume,
       others.empty() ? ""
                      : absl::StrCat(others.size(), " evaluations begin anew by mechanics version ",
                                     dem::EngineVersion()),
@@ -473,6 +486,10 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
   if (IsLoading(campaign, [=, this] { Cancel(campaign, also, reply); })) {
     return;
   }
+  if (unreadable_.count(campaign) > 0) {
+    SetUnreadable(campaign, CampaignState::kCancelled, "asked for", also, reply);
+    return;
+  }
   CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
     return;
@@ -487,7 +504,7 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
     SetStatus(*run, lease.key, EvaluationStatus::kWaiting, 0);
   }
   SetState(
-      *run, CampaignEvent::kCancel, "asked for",
+      *run, planning::CampaignEvent::kCancel, "asked for",
       [held, ends, also](Transaction& transaction) {
         if (also) {
           also(transaction);
@@ -694,8 +711,8 @@ std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last
   const campaign::Failure& failure = run.definition().campaign.failure;
   const int samples = run.record().submitted.samples;
   const int diverged = run.Diverged();
-  if (run.progress().pause_waived || !IsLeasable(run.state()) || run.Done() < kFewestDoneToPause ||
-      diverged <= failure.pause_above * samples) {
+  if (run.progress().pause_waived || !planning::IsLeasable(run.state()) ||
+      run.Done() < kFewestDoneToPause || diverged <= failure.pause_above * samples) {
     return "";
   }
   return absl::StrCat(
@@ -708,7 +725,7 @@ std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last
 void Scheduler::Advance(std::int64_t campaign) {
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr || computing_.count(campaign) > 0 || again_.count(campaign) > 0 ||
-      !IsLeasable(run->state()) || !run->WantsPlan()) {
+      !planning::IsLeasable(run->state()) || !run->WantsPlan()) {
     return;
   }
   run->Planned(false);
@@ -728,12 +745,13 @@ void Scheduler::Advance(std::int64_t campaign) {
 void Scheduler::ComputePlan(CampaignRun& run) {
   ports_.Compute([this, id = run.id(), definition = run.shared_definition(),
                   record = run.record()]() -> std::function<void()> {
-    auto plan = std::make_shared<absl::StatusOr<Plan>>(ReadAndPlan(ports_, *definition, record));
+    auto plan =
+        std::make_shared<absl::StatusOr<planning::Plan>>(ReadAndPlan(ports_, *definition, record));
     return [this, id, plan] { Adopt(id, *plan); };
   });
 }
 
-void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& computed) {
+void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<planning::Plan>& computed) {
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr) {  // cancelled meanwhile
     computing_.erase(campaign);
@@ -745,12 +763,12 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
     again_[campaign] = [this, campaign] { Advance(campaign); };
     return;
   }
-  Plan plan;
+  planning::Plan plan;
   if (computed.ok()) {
     plan = *computed;
   } else {
     plan.phase = run->progress().phase;
-    plan.event = CampaignEvent::kFail;
+    plan.event = planning::CampaignEvent::kFail;
     plan.reason = std::string(computed.status().message());
   }
   store::CampaignProgress& progress = run->progress();
@@ -759,7 +777,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   const bool begins = plan.start.has_value() && !plan.start->continues;
   if (begins) {
     progress.iteration = plan.start->iteration;
-    if (run->definition().campaign.method != campaign::Method::kSurrogateMsrs) {
+    if (!run->definition().campaign.method->chooses_while_running()) {
       progress.pause_waived = false;  // its iterations are blocks of one run of points
     }
   }
@@ -790,7 +808,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   Write(
       campaign,
       [plan, campaign, progress, now = ports_.UnixMs()](Transaction& t) {
-        scheduler::Write(plan, campaign, progress, now, t);
+        planning::Write(plan, campaign, progress, now, t);
       },
       [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
        changes_state = plan.event.has_value(),

@@ -14,14 +14,15 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "calib/v1/worker.pb.h"
+#include "server/methods/registry.h"
+#include "server/planning/growth.h"
+#include "server/planning/plan.h"
 #include "server/scheduler/campaign_run.h"
-#include "server/scheduler/growth.h"
 #include "server/scheduler/leases/arrival_rate.h"
 #include "server/scheduler/leases/fair_share.h"
 #include "server/scheduler/leases/lease_table.h"
 #include "server/scheduler/leases/waiting_runs.h"
 #include "server/scheduler/leases/worker_table.h"
-#include "server/scheduler/plan.h"
 #include "server/scheduler/ports.h"
 
 namespace calib::scheduler {
@@ -35,8 +36,9 @@ struct SchedulerOptions {
   /// own message; chosen: an acknowledgement within 250 ms of its state still leaves 100 ms to the
   /// disk.
   std::chrono::milliseconds gather{150};
-  int most_slots = 1024;      ///< of one worker, >= 1
-  int most_campaigns = 1000;  ///< that are not over, >= 1
+  int most_slots = 1024;                                  ///< of one worker, >= 1
+  int most_campaigns = 1000;                              ///< that are not over, >= 1
+  const campaign::MethodList* methods = &methods::All();  ///< that campaigns may have
 };
 
 /// What is known of a live campaign beyond the store.
@@ -68,7 +70,7 @@ class Scheduler {
   /// workers may come back and go on.
   absl::Status Load();
 
-  // ---- workers (scheduler_workers.cc) ----
+  // ---- workers (scheduler_links.cc, scheduler_runs.cc) ----
   /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's, or it has
   /// more slots than the server takes; INVALID_ARGUMENT for more attempts than its slots can hold;
   /// ALREADY_EXISTS when another process is connected under its name (WorkerTable::IsAnother).
@@ -105,7 +107,7 @@ class Scheduler {
   /// Adds runs to a design (growth.cc): true once they are on the disk, false where the
   /// same are there already. Errors: those of PlanGrowth(), RESOURCE_EXHAUSTED as for Submit().
   using GrowthReply = std::function<void(absl::StatusOr<bool>)>;
-  void AddRuns(const NewRuns& runs, const GrowthReply& reply);
+  void AddRuns(const planning::NewRuns& runs, const GrowthReply& reply);
   /// FAILED_PRECONDITION when the campaign's state does not allow it. `also` is written with the
   /// change (the request that asked for it); may be empty. A paused campaign's running evaluations
   /// go on to their ends.
@@ -154,11 +156,11 @@ class Scheduler {
   /// FindRun(), or replies that the campaign is over.
   CampaignRun* LiveRun(std::int64_t campaign, const Reply& reply);
 
-  // Workers (scheduler_workers.cc)
+  // Workers (scheduler_links.cc)
   /// Why a worker may not join; OK when it may.
   absl::Status Admit(const v1::Hello& hello) const;
 
-  // Work (scheduler_workers.cc)
+  // Work (scheduler_runs.cc, scheduler_leasing.cc)
   /// Leases what waits, in the order of FairLine, each to the worker with the most free slots that
   /// may run it; one that rests where a worker, which is there, can go on with it, waits for that.
   /// Not all in one turn where they are many: what workers say meanwhile is heard in between.
@@ -171,6 +173,9 @@ class Scheduler {
   void Grant(const WorkerTable::Choice& choice, const store::EvaluationKey& key);
   /// The worker that has spoken, or nullptr when its stream has been replaced.
   const WorkerEntry* Heard(std::int64_t session);
+  /// An end that the server itself writes.
+  static v1::Finished Because(std::int64_t attempt, const std::string& reason);
+  static Shares::Holding HoldingOf(const LeaseEntry& lease);
   /// Enters a lease; takes one out of all that knows of it, empty if there is none.
   void Hold(const LeaseEntry& lease);
   std::optional<LeaseEntry> Release(std::int64_t attempt);
@@ -232,8 +237,8 @@ class Scheduler {
   void Taken(std::int64_t campaign, const std::vector<store::EvaluationKey>& keys);
 
   // Runs that are added (growth.cc)
-  void Grow(const NewRuns& runs, const GrowthReply& reply);
-  void WriteGrowth(std::int64_t campaign, const Growth& growth, const GrowthReply& reply);
+  void Grow(const planning::NewRuns& runs, const GrowthReply& reply);
+  void WriteGrowth(std::int64_t campaign, const planning::Growth& growth, const GrowthReply& reply);
 
   // Campaigns (scheduler.cc)
   /// RESOURCE_EXHAUSTED when as many campaigns are not over as the server takes.
@@ -270,12 +275,15 @@ class Scheduler {
   /// the run that ended now did.
   static std::string TooManyDiverged(CampaignRun& run, const std::string& last);
   /// Changes the state, writes it after `also`, then replies.
-  void SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
+  /// Of a campaign that this program cannot read: its state in the store alone.
+  void SetUnreadable(std::int64_t campaign, CampaignState state, const std::string& reason,
+                     const store::Store::Job& also, const Reply& reply);
+  void SetState(CampaignRun& run, planning::CampaignEvent event, const std::string& reason,
                 const store::Store::Job& also, const Reply& reply);
   /// Computes the next plan when everything planned so far has ended. Only after a commit.
   void Advance(std::int64_t campaign);
   void ComputePlan(CampaignRun& run);
-  void Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& plan);
+  void Adopt(std::int64_t campaign, const absl::StatusOr<planning::Plan>& plan);
 
   // What changed, for version() and changed()
   void Changed(std::int64_t campaign) { changed_[campaign].any = ++version_; }
@@ -299,6 +307,7 @@ class Scheduler {
   std::set<std::int64_t> viewing_;    // and with a view in the making
   std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
+  std::map<std::int64_t, std::string> unreadable_;       // why, of those that are not over
   std::map<std::int64_t, std::pair<double, int>>
       durations_;  // seconds and number of ended attempts
   bool dispatches_later_ = false;

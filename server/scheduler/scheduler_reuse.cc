@@ -2,7 +2,7 @@
 // planned is reused by its plan (requests.h); here is what ends afterwards.
 #include <utility>
 
-#include "server/scheduler/decisions.h"
+#include "server/planning/decisions.h"
 #include "server/scheduler/scheduler.h"
 
 namespace calib::scheduler {
@@ -13,7 +13,8 @@ using store::Transaction;
 
 bool Scheduler::IsShared(const EvaluationKey& key) {
   CampaignRun* run = FindRun(key.campaign);
-  return run != nullptr && RunsToItsEnds(run->definition()) && !run->Find(key)->digest.empty();
+  return run != nullptr && planning::RunsToItsEnds(run->definition()) &&
+         !run->Find(key)->digest.empty();
 }
 
 std::string Scheduler::SharedDigest(const EvaluationKey& key) {

@@ -313,8 +313,8 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                });
 }
 
-absl::StatusOr<scheduler::NewRuns> CampaignsService::RunsToAdd(const v1::AddRunsRequest& request,
-                                                               const Caller& caller) {
+absl::StatusOr<planning::NewRuns> CampaignsService::RunsToAdd(const v1::AddRunsRequest& request,
+                                                              const Caller& caller) {
   RETURN_IF_ERROR(core_.WhyNotStore());
   ASSIGN_OR_RETURN(auto runs, CheckRuns(request));
   ASSIGN_OR_RETURN(auto reader, core_.Read());

@@ -99,8 +99,8 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   absl::StatusOr<NewFinding> FindingToKeep(const v1::AddFindingRequest& request,
                                            const Caller& caller);
   /// On the strand: what AddRuns() is to add, if it may.
-  absl::StatusOr<scheduler::NewRuns> RunsToAdd(const v1::AddRunsRequest& request,
-                                               const Caller& caller);
+  absl::StatusOr<planning::NewRuns> RunsToAdd(const v1::AddRunsRequest& request,
+                                              const Caller& caller);
   /// What is to be done with a campaign: its request_id is that of this verb and campaign.
   struct Wish {
     std::string verb;                          ///< with what it says besides

@@ -10,10 +10,11 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/origin.h"
 #include "server/messages/read_words.h"
-#include "server/scheduler/definition.h"
-#include "server/scheduler/growth.h"
-#include "server/scheduler/history.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/methods/registry.h"
+#include "server/planning/definition.h"
+#include "server/planning/growth.h"
+#include "server/planning/history.h"
+#include "server/planning/posterior_record.h"
 #include "server/service/calls.h"
 
 namespace calib::service {
@@ -25,6 +26,11 @@ using store::EvaluationRecord;
 using store::EvaluationStatus;
 
 namespace {
+
+// False for a method that this build does not know.
+bool RunsAreAdded(const campaign::Method* method) {
+  return method != nullptr && method->chosen_by() == campaign::ChosenBy::kRequest;
+}
 
 struct SampleStatus {
   EvaluationStatus worst = EvaluationStatus::kWaiting;
@@ -130,7 +136,7 @@ absl::StatusOr<Concluded> ConcludedIterations(store::Reader& reader, std::int64_
     if (!iteration.posterior.has_value()) {
       continue;
     }
-    auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
+    auto posterior = planning::PosteriorFromJson(*iteration.posterior);
     if (!posterior.ok()) {
       concluded.problem = absl::StrCat("the posterior of iteration ", iteration.number,
                                        " cannot be read: ", posterior.status().message());
@@ -220,12 +226,13 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_iteration(record.progress.iteration);
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
-  if (record.submitted.method == campaign::Method::kDesign) {  // what may be added nobody knows
+  const auto method = methods::All().Find(record.submitted.method);
+  if (RunsAreAdded(method.get())) {  // what may be added nobody knows
     status.set_max_iterations(record.progress.iteration + 1);
     status.set_samples(SamplesOfLast(record, evaluations));
   }
   // The first iteration may have given runs besides.
-  if (record.submitted.method == campaign::Method::kIterativeBayesianFilter) {
+  if (method != nullptr && method->batches_vary()) {
     if (const int samples = SamplesOfLast(record, evaluations); samples > 0)
       status.set_samples(samples);
   }
@@ -250,7 +257,8 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_model_evaluations(effort.model_evaluations);
   status.set_core_hours(effort.core_seconds / 3600);
   status.set_converged(record.progress.converged);
-  status.set_method(ToString(record.submitted.method));
+  status.set_method(record.submitted.method);
+  status.set_infers_nothing(method != nullptr && campaign::RunsRowsOnly(*method));
   status.set_created_unix_ms(record.submitted.created_unix_ms);
   status.set_phase(ToString(record.progress.phase));
   campaign::Origin origin = campaign::OriginOf(record.submitted.yaml);
@@ -344,7 +352,8 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
       }
     }
   }
-  if (found == nullptr && campaign::RunsRowsOnly(record.submitted.method)) {
+  const auto method = methods::All().Find(record.submitted.method);
+  if (found == nullptr && method != nullptr && campaign::RunsRowsOnly(*method)) {
     return absl::FailedPreconditionError(
         messages::InfersNothing(absl::StrCat("c", campaign), record.submitted.method));
   }
@@ -354,7 +363,7 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
                       : absl::StrCat("campaign c", campaign, " has ", complete,
                                      " complete iterations, counted from 0"));
   }
-  auto posterior = scheduler::PosteriorFromJson(*found);
+  auto posterior = planning::PosteriorFromJson(*found);
   if (posterior.ok()) {
     posterior->set_iterations(complete);
     posterior->set_core_hours(effort.core_seconds / 3600);
@@ -374,16 +383,17 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
   ASSIGN_OR_RETURN(const auto words, reader.WordsBySample(campaign));
   ASSIGN_OR_RETURN(const auto kept, reader.KeptBySample(campaign));
   ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
+  const bool is_design = RunsAreAdded(methods::All().Find(record.submitted.method).get());
   std::map<int, SamplePurpose> purposes;  // by iteration
   for (const store::IterationRecord& iteration : iterations) {
-    if (iteration.proposal == scheduler::kReplicates) {
+    if (iteration.proposal == planning::kReplicates) {
       purposes[iteration.number] = SamplePurpose::kReplicate;
     }
-    if (iteration.proposal == scheduler::kHeldOutDraws) {
+    if (iteration.proposal == planning::kHeldOutDraws) {
       purposes[iteration.number] = SamplePurpose::kDraw;
     }
-    if (record.submitted.method == campaign::Method::kDesign) {
-      purposes[iteration.number] = scheduler::StageIn(iteration.proposal);
+    if (is_design) {
+      purposes[iteration.number] = planning::StageIn(iteration.proposal);
     }
   }
   auto statuses = StatusBySample(evaluations);

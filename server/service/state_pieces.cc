@@ -7,7 +7,8 @@
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
 #include "server/messages/others.h"
-#include "server/scheduler/definition.h"
+#include "server/methods/registry.h"
+#include "server/planning/definition.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -21,7 +22,8 @@ constexpr std::size_t kMostKnown = 1000;
 absl::StatusOr<std::vector<ToldExperiment>> ReadExperiments(store::Reader& reader,
                                                             std::int64_t campaign) {
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
-  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
+  ASSIGN_OR_RETURN(const auto definition,
+                   planning::LoadDefinition(methods::All(), reader, record.submitted));
   const campaign::Campaign& read = definition->campaign;
   std::vector<ToldExperiment> experiments;
   for (const campaign::Experiment& experiment : read.experiments) {

@@ -13,8 +13,9 @@
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/model/race.h"
 #include "server/messages/attempt_spec.h"
-#include "server/scheduler/definition.h"
-#include "server/scheduler/history.h"
+#include "server/methods/registry.h"
+#include "server/planning/definition.h"
+#include "server/planning/history.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -125,9 +126,10 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
   if (request.has_seed()) {
     seed = request.seed();
   }
-  const campaign::ReadOutcome outcome = campaign::ReadCampaign(
-      request.campaign_file(), request.file_name(), scheduler::StoredFiles(reader, files), seed,
-      campaign::CampaignIs::kNew, {.covariance = static_cast<std::size_t>(limits.covariance)});
+  const campaign::ReadOutcome outcome =
+      campaign::ReadCampaign(methods::All(), request.campaign_file(), request.file_name(),
+                             planning::StoredFiles(reader, files), seed, campaign::CampaignIs::kNew,
+                             {.covariance = static_cast<std::size_t>(limits.covariance)});
   if (!outcome.problems.empty()) {
     return Refused(outcome.problems);
   }
@@ -142,9 +144,9 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
                               .yaml = request.campaign_file(),
                               .file_name = request.file_name(),
                               .seed = seed,
-                              .method = campaign.method,
-                              .samples = scheduler::LargestIteration(campaign),
-                              .max_iterations = campaign::MostBatches(campaign),
+                              .method = campaign.method->name(),
+                              .samples = planning::LargestIteration(campaign),
+                              .max_iterations = campaign.method->MostBatches(campaign),
                               .reading_rules = campaign::kReadingRules};
   if (campaign.lineage.has_value()) {  // its data are the parent's, as they were read there
     const auto parent = ParseCampaign(campaign.lineage->parent);
@@ -187,7 +189,7 @@ absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, st
   return finding;
 }
 
-absl::StatusOr<scheduler::NewRuns> CheckRuns(const v1::AddRunsRequest& request) {
+absl::StatusOr<planning::NewRuns> CheckRuns(const v1::AddRunsRequest& request) {
   ASSIGN_OR_RETURN(const auto campaign, ParseCampaign(request.campaign()));
   const auto stage = campaign::ValueOf(campaign::kSamplePurposeWords, request.stage());
   if (!stage || !campaign::IsStageOfDesign(*stage)) {
@@ -201,7 +203,7 @@ absl::StatusOr<scheduler::NewRuns> CheckRuns(const v1::AddRunsRequest& request) 
   if (request.rows().empty()) {
     return absl::InvalidArgumentError("a batch without a row adds nothing");
   }
-  scheduler::NewRuns runs{
+  planning::NewRuns runs{
       .campaign = campaign,
       .iteration = request.iteration(),
       .stage = *stage,

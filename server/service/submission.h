@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
-#include "server/scheduler/growth.h"
+#include "server/planning/growth.h"
 #include "server/service/limits.h"
 #include "server/store/reader.h"
 
@@ -28,7 +28,7 @@ absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, st
 
 /// The runs that a request adds. INVALID_ARGUMENT: it has none, or no stage of a design. What it
 /// takes to know more is the scheduler's (PlanGrowth).
-absl::StatusOr<scheduler::NewRuns> CheckRuns(const v1::AddRunsRequest& request);
+absl::StatusOr<planning::NewRuns> CheckRuns(const v1::AddRunsRequest& request);
 
 /// SHA-256 of everything in the request but its id.
 std::string ContentDigest(const v1::SubmitRequest& request);

@@ -39,11 +39,6 @@ Phase ToPhase(const std::string& text) {
   return campaign::ValueOf(campaign::kPhaseWords, text).value_or(Phase::kDone);
 }
 
-// Written from campaign::Method alone.
-Method ToMethod(const std::string& text) {
-  return campaign::ValueOf(campaign::kMethodWords, text).value_or(Method::kTable);
-}
-
 CampaignRecord ToCampaign(SQLite::Statement& row) {
   CampaignRecord record;
   NewCampaign& submitted = record.submitted;
@@ -54,7 +49,7 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   if (!row.isColumnNull(4)) {
     submitted.seed = std::bit_cast<std::uint64_t>(row.getColumn(4).getInt64());
   }
-  submitted.method = ToMethod(row.getColumn(5).getString());
+  submitted.method = row.getColumn(5).getString();
   submitted.samples = row.getColumn(6).getInt();
   submitted.max_iterations = row.getColumn(7).getInt();
   submitted.created_unix_ms = row.getColumn(8).getInt64();

@@ -14,7 +14,6 @@ namespace calib::store {
 
 using campaign::CampaignState;
 using campaign::EvaluationStatus;
-using campaign::Method;
 using campaign::Phase;
 
 /// A number that is not known yet; NULL in the store.
@@ -27,7 +26,7 @@ struct NewCampaign {
   std::string yaml{};
   std::string file_name{};
   std::optional<std::uint64_t> seed{};
-  Method method = Method::kIterativeBayesianFilter;
+  std::string method{};  ///< its name
   int samples = 0;
   int max_iterations = 1;
   std::int64_t created_unix_ms = 0;

@@ -104,9 +104,9 @@ void Transaction::InsertCampaign(const NewCampaign& campaign,
         "INSERT INTO campaign(id, name, yaml, file_name, seed, method, samples, max_iterations, "
         "created_unix_ms, reading_rules, owner, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
         "'queued')",
-        campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed,
-        ToString(campaign.method), campaign.samples, campaign.max_iterations,
-        campaign.created_unix_ms, campaign.reading_rules, campaign.owner);
+        campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed, campaign.method,
+        campaign.samples, campaign.max_iterations, campaign.created_unix_ms, campaign.reading_rules,
+        campaign.owner);
     for (const auto& [path, digest] : files) {
       connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
                       campaign.id, path, digest);
@@ -122,6 +122,13 @@ void Transaction::SetProgress(std::int64_t campaign, const CampaignProgress& pro
         "pause_waived = ? WHERE id = ?",
         ToString(progress.state), progress.reason, ToString(progress.phase), progress.iteration,
         progress.converged, progress.pause_waived, campaign);
+  });
+}
+
+void Transaction::SetState(std::int64_t campaign, CampaignState state, const std::string& reason) {
+  Guard([&] {
+    connection_.Run("UPDATE campaign SET state = ?, reason = ? WHERE id = ?", ToString(state),
+                    reason, campaign);
   });
 }
 

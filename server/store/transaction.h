@@ -45,6 +45,8 @@ class Transaction {
   /// files: path -> digest of a stored blob.
   void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
   void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
+  /// Of its progress state and reason alone.
+  void SetState(std::int64_t campaign, CampaignState state, const std::string& reason);
   void SetPriority(std::int64_t campaign, int priority);
   /// Slots that the runs of an owner hold at most, >= 0; empty: no bound.
   void SetQuota(const std::string& owner, std::optional<int> slots);

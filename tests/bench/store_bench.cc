@@ -21,8 +21,7 @@ class StateStore {
     std::filesystem::create_directories(folder_);
     store_ = *Store::Open((folder_ / "calib.db").string());
     const absl::Status status = store_->WriteNow([](Transaction& t) {
-      t.InsertCampaign({.id = 1, .name = "bench", .method = Method::kSqmc, .samples = kSamples},
-                       {});
+      t.InsertCampaign({.id = 1, .name = "bench", .method = "sqmc", .samples = kSamples}, {});
       t.InsertIteration(1, 0, "{}");
       for (int i = 0; i < kSamples; ++i) {
         t.InsertSample(1, {.sample = i, .parameters = std::vector<double>(5, 1.0)});

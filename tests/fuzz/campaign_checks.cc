@@ -7,6 +7,7 @@
 #include "absl/strings/str_split.h"
 #include "server/campaign/file/derive.h"
 #include "server/campaign/model/race.h"
+#include "server/methods/registry.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
@@ -125,7 +126,7 @@ campaign::ReadOutcome ReadAndCheck(const std::string& yaml,
   auto files = SmallFiles();
   for (const auto& [path, content] : replaced) files[path] = content;
   const campaign::FileReader reader = campaign::testing::ReaderOf(files);
-  auto outcome = campaign::ReadCampaign(yaml, "c.yaml", reader, std::nullopt,
+  auto outcome = campaign::ReadCampaign(methods::All(), yaml, "c.yaml", reader, std::nullopt,
                                         campaign::CampaignIs::kNew, kLimits);
   for (const campaign::Problem& problem : outcome.problems) {
     Expect(!problem.message.empty() && problem.line >= 0, "a problem says what and where");
@@ -140,13 +141,13 @@ campaign::ReadOutcome ReadAndCheck(const std::string& yaml,
   }
   CheckRuns(outcome.campaign);
   if (!campaign::Priors(outcome.campaign).is_constrained()) {  // else half a million points anew
-    const auto again = campaign::ReadCampaign(yaml, "c.yaml", reader, std::nullopt,
+    const auto again = campaign::ReadCampaign(methods::All(), yaml, "c.yaml", reader, std::nullopt,
                                               campaign::CampaignIs::kStored, kLimits);
     Expect(again.problems.empty(),
            "what was accepted once is: " +
                (again.problems.empty() ? "" : campaign::ToString(again.problems.front())));
   }
-  Expect(campaign::Derive(yaml,
+  Expect(campaign::Derive(methods::All(), yaml,
                           {.name = "derived", .lineage = {.parent = "c1", .purpose = "extension"}})
              .ok(),
          "a campaign can be derived from one that was accepted");

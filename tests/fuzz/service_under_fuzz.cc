@@ -33,10 +33,10 @@ constexpr service::Limits kSmall{.slots = 16,
                                  .packings = 8,
                                  .grains = 2000};
 /// Nothing runs out while an input is tried.
-constexpr scheduler::SchedulerOptions kOptions{.lease = std::chrono::hours(1),
-                                               .heartbeat = std::chrono::minutes(1),
-                                               .most_slots = kSmall.slots,
-                                               .most_campaigns = kSmall.campaigns};
+const scheduler::SchedulerOptions kOptions{.lease = std::chrono::hours(1),
+                                           .heartbeat = std::chrono::minutes(1),
+                                           .most_slots = kSmall.slots,
+                                           .most_campaigns = kSmall.campaigns};
 /// Threads of each pool of Core: as many tasks that wait for each other are behind all before them.
 constexpr int kPoolThreads = 2;
 

@@ -6,6 +6,7 @@
 #include "server/campaign/file/derive.h"
 #include "server/client/laboratory.h"
 #include "server/client/load_view.h"
+#include "server/methods/registry.h"
 #include "tests/support/deployment.h"
 #include "tests/support/small_campaign.h"
 
@@ -64,7 +65,7 @@ void Grow(int workers, bool killed, std::string& bits) {
   const auto parent = client::LoadView((*session)->client(), "c1");
   ASSERT_TRUE(parent.ok()) << parent.status();
   const auto text = campaign::Derive(
-      parent->source.campaign_file(),
+      methods::All(), parent->source.campaign_file(),
       {.name = "race",
        .lineage = {.parent = "c1", .purpose = "design"},
        .parameters = {{"linear_cohesion.energy_density",

@@ -153,6 +153,19 @@ def circles(graph):
     return {frozenset(b for b in reach[a] if a in reach.get(b, ())) for a in reach if a in reach[a]}
 
 
+def named_methods(tree, rules):
+    rooms = [os.path.basename(folder) for folder in tree.folders if os.path.dirname(folder) == rules.ROOMS]
+    names = [name for name in rooms if name not in rules.COMMON_WORDS.split()]
+    if not names:
+        return
+    named = re.compile(rf'\b({"|".join(sorted(names))})\b')
+    for path in tree.sources('.h', '.cc'):
+        if path.startswith('server/') and not within(path, rules.ROOMS) and path not in rules.MAY_NAME_THEM.split():
+            for number, line in enumerate(tree.lines(path), 1):
+                if found := named.search(line):
+                    yield f'{path}:{number}: names {found[1]}; what a method is like is asked of campaign::Method ({rules.ROOMS})'
+
+
 def full_folders(tree, rules):
     for folder, names in tree.folders.items():
         if folder.split('/')[0] in PARTS + ('tests',) and folder not in rules.MAY_HOLD_MORE.split():
@@ -241,7 +254,7 @@ def too_many_words(tree, rules):
         yield f'{total} words of Markdown, at most {rules.MOST_WORDS} (longest: {longest})'
 
 
-RULES = (unknown_folders, wrong_arrows, cycles, full_folders, impure_libraries, calls_of_libm, readmes, missing_doors, too_many_words)
+RULES = (unknown_folders, wrong_arrows, cycles, named_methods, full_folders, impure_libraries, calls_of_libm, readmes, missing_doors, too_many_words)
 
 
 def offences(root, rules=house):

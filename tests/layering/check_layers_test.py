@@ -12,15 +12,17 @@ RULES = types.SimpleNamespace(
     ORDER="""
 dem        ground < { left right } < top < top/deep
 proto      calib/v1 < rpc
-server     campaign < store < client
+server     campaign < ways/quick < store < client
 """,
     KNOWS="""
 dem                   |                              |
 server/campaign       | dem/ground                   | yaml-cpp
 server/store          | server/campaign              | SQLiteCpp
+server/ways           | server/campaign              |
 server/client         | server/campaign proto        | grpcpp
 server/client/session | server/campaign server/store | grpcpp
 """,
+    ROOMS='server/ways', COMMON_WORDS='slow', MAY_NAME_THEM='server/store/k.h',
     WATCHED='grpcpp SQLiteCpp yaml-cpp',
     MOST_FILES=3,
     MAY_HOLD_MORE='dem/right',
@@ -44,7 +46,8 @@ GOOD = {
     'server/campaign/i.h': '#include "dem/ground/a.h"\n#include <yaml-cpp/yaml.h>\n',
     'server/client/session.cc': '#include "server/store/k.h"\n#include "server/client/l.h"\n',
     'server/client/l.h': '#include "calib/v1/m.pb.h"\n',
-    'server/store/k.h': '#include "server/campaign/i.h"\n',
+    'server/store/k.h': '#include "server/campaign/i.h"\nconst char* way = "quick";\n',
+    'server/ways/quick/w.cc': 'const char* name = "quick";\n',
     'proto/calib/v1/m.proto': '',
     'build/left/README.md': 'not looked at ' * 100,
 }
@@ -93,6 +96,9 @@ class CheckLayers(unittest.TestCase):
 
     def test_a_library_that_may_not_be_known(self):
         self.says({'server/campaign/n.h': '#  include <grpcpp/channel.h>\n'}, 'may not include <grpcpp/channel.h>')
+
+    def test_a_method_that_is_named_outside_of_its_room(self):
+        self.says({'server/client/n.h': 'bool Quick() { return name() == "quick"; }  // quickly\n'}, 'server/client/n.h:1: names quick')
 
     def test_a_cycle_of_two_folders(self):
         self.assertIn('cycle of folders: dem/ground dem/left', found({'dem/ground/n.h': '#include "dem/left/b.h"\n'}))
@@ -159,7 +165,8 @@ class CheckLayers(unittest.TestCase):
             self.assertTrue(any(check_layers.within(folder, row) for row in rows), folder)
         for row, (prefixes, libraries) in rows.items():
             for prefix in prefixes + [os.path.dirname(row) if row == 'server/client/session' else row]:
-                self.assertTrue(any(check_layers.within(folder, prefix) for folder in known), f'{row}: {prefix}')
+                place = os.path.dirname(prefix) if prefix.endswith('.h') else prefix
+                self.assertTrue(any(check_layers.within(folder, place) for folder in known), f'{row}: {prefix}')
             self.assertLessEqual(set(libraries), set(house.WATCHED.split()), row)
 
 

@@ -9,14 +9,16 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
            < { diagnosis discrepancy prediction sensitivity } < adaptive
 proto      calib/v1 < rpc
 worker     program < engine < .
-server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < scheduler < service/upkeep < { service report/documents } < client < { page diagnosis inspection } < { ctl/shell ctl/slurm } < ctl < ctl/verbs < .
+server     { campaign/model campaign/file/text access } < campaign/keys < campaign/checks < { campaign/file/parameters campaign/file/shared } < campaign/file/program < campaign/file < messages < { store report/text } < planning < planning/phases
+           < methods/iterative_bayesian_filter < { methods/adaptive_emulator methods/sqmc methods/tmcmc methods/surrogate_msrs methods/table methods/design } < methods
+           < { scheduler/leases report/views } < scheduler < service/upkeep < { service report/documents } < client < { page diagnosis inspection } < { ctl/shell ctl/slurm } < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
 # ORDER holds inside a part as well.
 CAMPAIGN_OF_DEM = 'dem/elementary dem/geometry dem/particles dem/model dem/formula dem/neighbor dem/registry'
 ASKING_OF_DEM = 'dem/model dem/formula dem/registry'
+METHODS = 'server/methods/registry.h'  # all that anybody else knows of them
 KNOWS = f"""
 dem               |                                                                        |
 inference         |                                                                        |
@@ -31,17 +33,22 @@ server/campaign/file/text |                                                     
 server/campaign/file/program | {CAMPAIGN_OF_DEM} inference server/campaign                                  | nlohmann
 server/messages   | dem proto/calib proto/rpc server/campaign                              | chrono nlohmann
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
-server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
-server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
+server/planning   | dem inference proto/calib server/campaign server/messages server/store | nlohmann
+server/methods    | inference server/campaign server/planning                              | nlohmann
+server/scheduler  | dem inference proto/calib server/campaign server/messages server/store server/planning {METHODS} | chrono spdlog nlohmann
+server/service    | dem inference proto server/campaign server/access server/messages server/store server/planning {METHODS} server/scheduler | grpcpp spdlog chrono nlohmann
 server            | proto/rpc server/messages server/store server/scheduler server/service server/client server/page | spdlog CLI chrono
-server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
-server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp nlohmann chrono
+server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages {METHODS} | nlohmann chrono
+server/client     | inference proto server/campaign server/access server/messages server/report {METHODS} | grpcpp nlohmann chrono
 server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono
 server/page       | proto/calib proto/rpc server/access server/messages server/report server/client | openssl nlohmann chrono
-server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann
-server/inspection | dem/registry server/campaign                                          | nlohmann
-server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/page server/diagnosis server/inspection | CLI nlohmann chrono
+server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client {METHODS} | nlohmann
+server/inspection | dem/registry server/campaign {METHODS} | nlohmann
+server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/page server/diagnosis server/inspection {METHODS} | CLI nlohmann chrono
 """
+# Methods are named in their rooms alone: the folders of ROOMS, where their names are no common words. The word of where a posterior
+# comes from is one of them.
+ROOMS, COMMON_WORDS, MAY_NAME_THEM = 'server/methods', 'table design', 'server/campaign/model/words.h'
 WATCHED = 'grpcpp openssl SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 
 # Folders with one file per name, or which another plan rebuilds, may hold more than MOST_FILES (.h and .cc of one name count one).

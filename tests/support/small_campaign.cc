@@ -82,9 +82,7 @@ experiments:
 {}{}noise: given
 inference:
   method: {}
-  samples: {}
-  max_iterations: {}
-{}failure: {{attempts: {}, pause_above: 0.5}}
+{}{}failure: {{attempts: {}, pause_above: 0.5}}
 seed: 7
 {})",
       Experiment("tx", "0.1 MPa", options.relative_noise, false, options.packings),
@@ -92,8 +90,11 @@ seed: 7
           ? Experiment("tx2", "0.2 MPa", options.relative_noise, !options.with_second,
                        options.packings)
           : "",
-      options.method, options.samples, options.max_iterations, options.inference,
-      options.failure_attempts, options.extra);
+      options.method,
+      options.samples > 0 ? fmt::format("  samples: {}\n  max_iterations: {}\n", options.samples,
+                                        options.max_iterations)
+                          : "",
+      options.inference, options.failure_attempts, options.extra);
   return campaign;
 }
 

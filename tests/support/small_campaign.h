@@ -13,7 +13,7 @@ struct SmallCampaign {
 };
 
 struct SmallCampaignOptions {
-  int samples = 8;
+  int samples = 8;  ///< 0: neither samples nor max_iterations are stated
   int max_iterations = 2;
   int load_steps = 4;
   int failure_attempts = 5;

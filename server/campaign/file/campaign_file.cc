@@ -192,9 +192,10 @@ FileReader DiskReader(const std::string& campaign_file_path) {
   };
 }
 
-ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
-                         const FileReader& reader, std::optional<std::uint64_t> seed_override,
-                         CampaignIs is, const ReadLimits& limits) {
+ReadOutcome ReadCampaign(const MethodList& methods, const std::string& yaml_text,
+                         const std::string& file_name, const FileReader& reader,
+                         std::optional<std::uint64_t> seed_override, CampaignIs is,
+                         const ReadLimits& limits) {
   ReadOutcome outcome;
   ProblemList problems(file_name);
   YamlParse parse = ParseYaml(yaml_text);
@@ -210,7 +211,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
   if (parse.root->kind == YamlNode::Kind::kMap) {
     ReadName(map, campaign);
     ReadModel(map, context, campaign);
-    ReadInference(map, campaign);
+    ReadInference(map, methods, campaign);
     ReadResources(map, campaign);
     const std::size_t sound = problems.size();
     ReadParameters(map, is_new, campaign);
@@ -221,7 +222,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
       map.Ignore({"prior_correlation", "constraints"});  // of parameters that could not be read
     }
     CheckSamples(map, campaign);
-    ReadStart(map, campaign);
+    ReadStart(map, methods, campaign);
     if (problems.size() == sound) {
       StateNominalDensity(*parse.root, campaign);
       StateNominalValues(*parse.root, campaign);
@@ -234,7 +235,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     if (is_new && campaign.program && problems.size() == before) CheckProgram(map, campaign);
     if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
     if (is_new) CheckReplicates(map, campaign);
-    if (is_new && campaign.method == Method::kDesign && problems.size() == 0) {
+    if (is_new && RunsAreAdded(campaign) && problems.size() == 0) {
       CheckDesign(map, campaign);
     }
     if (campaign.precomputed) {

@@ -31,9 +31,9 @@ struct ReadOutcome {
 };
 
 /// Parses and validates everything `submit` checks. Never throws; reads files only through
-/// `reader`.
-ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
-                         const FileReader& reader,
+/// `reader`. The campaign's method is one of `methods`.
+ReadOutcome ReadCampaign(const MethodList& methods, const std::string& yaml_text,
+                         const std::string& file_name, const FileReader& reader,
                          std::optional<std::uint64_t> seed_override = std::nullopt,
                          CampaignIs is = CampaignIs::kNew, const ReadLimits& limits = {});
 

@@ -63,17 +63,15 @@ YamlNode Rows(const Derivation& derivation) {
   return YamlList(std::move(rows));
 }
 
-// The samples that surrogate_msrs starts from grow with the parameters.
-void RaiseSamples(YamlNode& root) {
+// The samples that a method starts from may grow with the parameters.
+void RaiseSamples(const MethodList& methods, YamlNode& root) {
   YamlNode& inference = YamlAt(root, "inference");
   const YamlNode* method = YamlFind(inference, "method");
   const YamlNode* samples = YamlFind(inference, "samples");
+  const auto named = method != nullptr ? methods.Find(method->scalar) : nullptr;
   int given = 0;
-  if (method == nullptr || ValueOf(kMethodWords, method->scalar) != Method::kSurrogateMsrs ||
-      samples == nullptr || !absl::SimpleAtoi(samples->scalar, &given)) {
-    return;
-  }
-  const int fewest = 2 * static_cast<int>(YamlAt(root, "parameters").entries.size()) + 1;
+  if (named == nullptr || samples == nullptr || !absl::SimpleAtoi(samples->scalar, &given)) return;
+  const int fewest = named->fewest_samples(YamlAt(root, "parameters").entries.size());
   if (given < fewest) YamlAt(inference, "samples") = YamlScalar(absl::StrCat(fewest));
 }
 
@@ -86,10 +84,12 @@ void DropNoiseGroups(YamlNode& root) {
   if (!inferred && YamlFind(*noise, "model_error") != nullptr) YamlErase(root, "noise");
 }
 
-void ChangeInference(const Derivation& derivation, YamlNode& root) {
+void ChangeInference(const MethodList& methods, const Derivation& derivation, YamlNode& root) {
   if (derivation.race || (!derivation.rows.empty() && !derivation.method)) {
     YamlNode inference = YamlMap(
-        {{"method", YamlScalar(ToString(derivation.race ? Method::kDesign : Method::kTable))}});
+        {{"method",
+          YamlScalar(std::string(
+              methods.Of(derivation.race ? ChosenBy::kRequest : ChosenBy::kFile)->name()))}});
     if (derivation.race) {
       std::vector<YamlNode> race;
       for (const std::string& effect : *derivation.race) race.push_back(YamlScalar(effect));
@@ -104,14 +104,14 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
   }
   YamlNode& inference = YamlAt(root, "inference");
   if (derivation.method) {
-    YamlAt(inference, "method") = YamlScalar(ToString(*derivation.method));
+    YamlAt(inference, "method") = YamlScalar(*derivation.method);
     YamlErase(inference, "freeze");  // it speaks of the parent's iterations
   }
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
   }
   if (!derivation.rows.empty()) YamlAt(inference, "rows") = Rows(derivation);
-  if (!derivation.parameters.empty()) RaiseSamples(root);
+  if (!derivation.parameters.empty()) RaiseSamples(methods, root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
   }
@@ -131,7 +131,8 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
 
 }  // namespace
 
-absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivation& derivation) {
+absl::StatusOr<std::string> Derive(const MethodList& methods, const std::string& parent_yaml,
+                                   const Derivation& derivation) {
   YamlParse parse = ParseYaml(parent_yaml);
   if (parse.error || parse.root->kind != Kind::kMap) {
     return absl::InvalidArgumentError("the campaign it is derived from is not a YAML map");
@@ -144,7 +145,7 @@ absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivat
   StateLabels(root);
   ChangeExperiments(derivation, root);
   if (derivation.new_labels) AddLabels(root);
-  ChangeInference(derivation, root);
+  ChangeInference(methods, derivation, root);
   // Strengths are tried up to where the model breaks: what diverges there is an answer, no fault.
   YamlAt(YamlAt(root, "failure"), "pause_above") = YamlScalar("1");
   return ToYaml(root);

@@ -2,7 +2,7 @@
 // The text of a campaign that follows from another one: the same experiments, model and settings,
 // with what is said here changed. Pure: the same parent and changes give the same text, by which it
 // is recognised when it is asked for again. However many runs diverge, it is not paused. An
-// extension of surrogate_msrs gets the samples that its parameters ask for.
+// extension gets the samples that its method asks for with its parameters.
 
 #include <cstdint>
 #include <map>
@@ -29,7 +29,7 @@ struct Derivation {
   /// Of parameters with `per`: labels of these experiments that the parent lacks have a value of
   /// their own; false: they have the common one.
   bool new_labels = false;
-  std::optional<Method> method{};  ///< the keys of the parent's stay: of the same family
+  std::optional<std::string> method{};  ///< the keys of the parent's stay: of the same family
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table or design
@@ -47,6 +47,7 @@ struct Derivation {
 
 /// INVALID_ARGUMENT when the parent's text cannot be read; whether the result is a valid campaign
 /// is seen when it is read.
-absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivation& derivation);
+absl::StatusOr<std::string> Derive(const MethodList& methods, const std::string& parent_yaml,
+                                   const Derivation& derivation);
 
 }  // namespace calib::campaign

@@ -244,7 +244,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
       .free_names = HasNamesOfItsOwn(campaign, experiment),
       .by_unit_only = campaign.program.has_value() && test == nullptr,
       .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
-      .measured = !RunsRowsOnly(campaign.method)};
+      .measured = !RunsRowsOnly(campaign)};
   const bool wrong_test = test == nullptr && map.Has("test");
   if (campaign.precomputed || test != nullptr || (campaign.program && !wrong_test)) {
     ReadMeasurements(map, rules, context, experiment);

@@ -1,11 +1,12 @@
 #include "server/campaign/file/read_inference.h"
 
 #include <algorithm>
-#include <array>
-#include <set>
+#include <map>
+#include <memory>
+#include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/keys/bounds.h"
@@ -51,181 +52,100 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   filter.noise = mode;
 }
 
-constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
-
-void ReadMethod(MapReader& map, Campaign& campaign) {
-  campaign.method = map.Choice("method", kMethodWords).value_or(campaign.method);
-  if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
-  if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
-  if (campaign.method == Method::kDesign) {
-    if (campaign.precomputed) {
-      map.Problem("method",
-                  "design is for runs still to be made; those that exist already are "
-                  "what they are: use sqmc");
-    }
-    return;
-  }
-  if (campaign.precomputed) {
-    map.Problem("method", absl::StrCat(ToString(campaign.method),
-                                       " chooses its own samples, and runs that exist "
-                                       "already are what they are; use sqmc"));
-  } else if (campaign.filter.noise == NoiseMode::kEssTarget) {
-    map.Problem("method", absl::StrCat(ToString(campaign.method),
+void ReadMethodName(MapReader& map, const MethodList& methods, Campaign& campaign) {
+  if (const auto name = map.Choice("method")) campaign.method = methods.Find(*name);
+  const Method& method = *campaign.method;
+  if (campaign.precomputed && !method.takes_made_runs()) {
+    map.Problem("method",
+                absl::StrCat(method.name(),
+                             RunsAreAdded(campaign) ? " is for runs still to be made; those"
+                                                    : " chooses its own samples, and runs",
+                             " that exist already are what they are; use ",
+                             methods.NamesOf(&Method::takes_made_runs)));
+  } else if (campaign.filter.noise == NoiseMode::kEssTarget && method.needs_errors()) {
+    map.Problem("method", absl::StrCat(method.name(),
                                        " needs the errors of the readings; use noise: "
                                        "given or noise: inferred with it"));
   }
 }
 
-void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
-  filter.design = map.Choice("design", kDesignWords).value_or(filter.design);
-}
-
-void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
-  tmcmc.steps = static_cast<int>(map.Integer("steps").value_or(tmcmc.steps));
-  tmcmc.target_cv = map.Quantity("target_cv").value_or(tmcmc.target_cv);
-}
-
-void ReadTermination(MapReader& map, Campaign& campaign) {
-  const YamlNode* node = map.Find("termination");
-  if (node == nullptr) return;
-  if (node->kind == YamlNode::Kind::kScalar && node->scalar == "off") {
-    campaign.termination.reset();
-    return;
-  }
-  campaign.termination = map.Quantity("termination");
-}
-
-void ReadDecisions(MapReader& map, Campaign& campaign) {
+void ReadDecisions(MapReader& map, const MethodList& methods, Campaign& campaign) {
   if (map.Choice("decisions", kDecisionsWords) != Decisions::kImmediate) return;
-  if (campaign.method != Method::kSurrogateMsrs && !IsFilter(campaign.method)) {
-    map.Problem("decisions", absl::StrCat(ToString(campaign.method),
+  if (!campaign.method->may_decide_at_once()) {
+    map.Problem("decisions", absl::StrCat(campaign.method->name(),
                                           " decides nothing while runs are under way; immediate "
-                                          "is for surrogate_msrs, and for sqmc and "
-                                          "iterative_bayesian_filter with early_stopping"));
+                                          "is for ",
+                                          methods.NamesOf(&Method::may_decide_at_once)));
     return;
   }
   campaign.decisions = Decisions::kImmediate;
 }
 
-void ReadFilterOptions(MapReader& map, Campaign& campaign) {
-  inference::FilterOptions& filter = campaign.filter;
-  filter.tolerance = map.Quantity("tolerance").value_or(filter.tolerance);
-  filter.defensive_share = map.Quantity("defensive_share").value_or(filter.defensive_share);
-  filter.max_components =
-      static_cast<int>(map.Integer("max_components").value_or(filter.max_components));
-  filter.concentration = map.Quantity("concentration").value_or(filter.concentration);
-  filter.mixture = map.Choice("mixture", kMixtureWords).value_or(filter.mixture);
-  ReadDesign(map, filter);
-  filter.reversed_path = map.TrueOrFalse("reversed_path").value_or(filter.reversed_path);
-  if (campaign.filter.noise != NoiseMode::kEssTarget) {
-    filter.ess_target = map.Quantity("ess_target").value_or(filter.ess_target);
-  } else if (map.Has("ess_target")) {
-    map.Ignore({"ess_target"});
-    map.Problem("ess_target", "is given by noise: {ess_target: ...} already; remove it here");
+std::vector<std::string> OwnKeys(const Method& method) {
+  std::vector<std::string> names;
+  for (const Section& section : method.Keys()) {
+    for (const Key& key : section.keys) names.push_back(key.name);
+    break;  // those behind it are of keys of these
   }
-}
-
-// freeze: {2: [young_modulus], 3: converged}; the names are looked at once the parameters are
-// known.
-void ReadFreeze(MapReader& inference, Campaign& campaign) {
-  inference.Ignore({"freeze"});
-  if (!inference.Has("freeze")) return;
-  if (campaign.method != Method::kIterativeBayesianFilter || campaign.precomputed) {
-    inference.Problem("freeze",
-                      "belongs to method: iterative_bayesian_filter with runs still to be made");
-    return;
-  }
-  auto map = inference.Map("freeze");
-  if (!map) return;
-  for (const std::string& key : map->Keys()) {
-    int iteration = 0;
-    if (!absl::SimpleAtoi(key, &iteration) || iteration < 1 ||
-        iteration >= campaign.max_iterations) {
-      map->Ignore({key});
-      map->Problem(key, absl::StrCat("is no iteration after the first; allowed: 1 to ",
-                                     campaign.max_iterations - 1, " (the first is 0)"));
-      continue;
-    }
-    Freeze freeze;
-    const auto names = map->TextList(key);
-    if (!names) continue;
-    freeze.converged = *names == std::vector<std::string>{"converged"};
-    if (!freeze.converged) freeze.names = *names;
-    campaign.freeze[iteration] = std::move(freeze);
-  }
-  map->Finish();
+  return names;
 }
 
 // Keys that this method does not read.
-void RefuseKeysOfOthers(MapReader& map, Method method) {
-  const auto refuse = [&map](const std::vector<std::string>& keys, const std::string& owner) {
-    map.Ignore(keys);
-    for (const std::string& key : keys) {
-      if (map.Has(key)) map.Problem(key, "belongs to " + owner + "; remove it");
+void RefuseKeysOfOthers(MapReader& map, const MethodList& methods, const Method& method) {
+  const std::vector<std::string> own = OwnKeys(method);
+  std::map<std::string, std::vector<std::string>> owners;  // by key
+  for (const auto& other : methods.all()) {
+    for (const std::string& key : OwnKeys(*other)) {
+      if (std::find(own.begin(), own.end(), key) == own.end()) {
+        owners[key].emplace_back(other->name());
+      }
     }
+  }
+  for (const auto& [key, names] : owners) {
+    map.Ignore({key});
+    if (map.Has(key)) {
+      map.Problem(
+          key, absl::StrCat("belongs to method: ", absl::StrJoin(names, " and "), "; remove it"));
+    }
+  }
+  const auto refuse = [&map](const char* key, const std::string& why) {
+    map.Ignore({key});
+    if (map.Has(key)) map.Problem(key, why);
   };
-  if (!IsFilter(method)) {
-    refuse({"tolerance", "ess_target", "design", "defensive_share", "max_components",
-            "concentration", "mixture", "reversed_path"},
-           "method: iterative_bayesian_filter and sqmc");
+  if (!method.takes_first_proposal()) {
+    refuse("first_proposal", absl::StrCat("is not for ", method.name(), "; remove it"));
   }
-  if (method != Method::kSurrogateMsrs) {
-    refuse({"surrogate", "termination", "in_flight"}, "method: surrogate_msrs");
-  }
-  if (method != Method::kTmcmc) refuse({"steps", "target_cv"}, "method: tmcmc");
-  if (method == Method::kDesign) {
-    refuse({"samples", "max_iterations", "replicates", "first_proposal"},
-           "methods that choose their samples");
-  } else {
-    refuse({"race"}, "method: design");
+  if (method.chosen_by() != ChosenBy::kRequest) return;
+  for (const char* key : {"samples", "max_iterations", "replicates"}) {
+    refuse(key, "belongs to methods that choose their samples; remove it");
   }
 }
 
-void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
-  auto map = campaign_map.Map("inference");
-  if (map) {
-    ReadMethod(*map, campaign);
-    if (campaign.method == Method::kDesign) {
-      campaign.samples = kMostRowsOfBatch;
-      campaign.max_iterations = 1;
-      ReadRace(*map, campaign);
-      ReadFreeze(*map, campaign);
-      ReadDecisions(*map, campaign);
-      RefuseKeysOfOthers(*map, campaign.method);
-      map->Ignore({"rows"});  // read once the parameters are known
-      map->Finish();
-      return;
-    }
-    const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
+void ReadMethodSection(MapReader& campaign_map, const MethodList& methods, Campaign& campaign) {
+  campaign.method = methods.standard();
+  const Section section = InferenceSection(methods);
+  auto map = campaign_map.Map("inference", section);
+  if (map) ReadMethodName(*map, methods, campaign);
+  const std::shared_ptr<const Method> method = campaign.method;
+  campaign.max_iterations = method->standard_iterations();
+  if (!map) return;
+  if (RunsAreAdded(campaign)) {
+    campaign.samples = kMostRowsOfBatch;
+  } else {
     campaign.samples =
-        static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
+        static_cast<int>(map->Integer("samples", method->fewest_samples(0), kMostSamples)
+                             .value_or(campaign.samples));
     campaign.max_iterations =
         static_cast<int>(map->Integer("max_iterations").value_or(campaign.max_iterations));
-    if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
     if (const auto replicates = map->Integer("replicates")) {
       campaign.replicates = static_cast<int>(*replicates);
     }
-    ReadFreeze(*map, campaign);
-    if (campaign.method == Method::kSurrogateMsrs) {
-      campaign.surrogate =
-          map->Choice("surrogate", kSurrogateModelWords).value_or(campaign.surrogate);
-      ReadTermination(*map, campaign);
-      campaign.in_flight = static_cast<int>(map->Integer("in_flight").value_or(campaign.in_flight));
-    }
-    ReadDecisions(*map, campaign);
-    if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
-    RefuseKeysOfOthers(*map, campaign.method);
-    map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
-    if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
-        campaign.max_iterations != 1) {
-      map->Problem(
-          "max_iterations",
-          "has to be 1 with sqmc, which has one iteration; use iterative_bayesian_filter for more");
-    }
-    map->Finish();
   }
-  if (campaign.method == Method::kSqmc || campaign.method == Method::kTable)
-    campaign.max_iterations = 1;
+  campaign.method = method->Read(*map, campaign);
+  ReadDecisions(*map, methods, campaign);
+  RefuseKeysOfOthers(*map, methods, *method);
+  map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
+  map->Finish();
 }
 
 /// Numbers within (0, 1), increasing; empty after a problem.
@@ -250,7 +170,7 @@ std::vector<double> ReadRungs(MapReader& map) {
   return rungs;
 }
 
-void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
+void ReadEarlyStopping(MapReader& campaign_map, const MethodList& methods, Campaign& campaign) {
   const YamlNode* node = campaign_map.Find("early_stopping");
   if (node == nullptr) return;
   if (node->kind == YamlNode::Kind::kScalar &&
@@ -274,25 +194,24 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
                  "rest and go on, which a program (model.command) cannot: each would begin anew; "
                  "leave them out");
   }
-  if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
-    map->Problem("rungs",
-                 "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
-                 "on its own");
+  if (!stopping.rungs.empty() && !campaign.method->weighs_samples()) {
+    map->Problem("rungs", absl::StrCat("is for ", methods.NamesOf(&Method::weighs_samples),
+                                       "; others judge each run on its own"));
   } else if (!stopping.rungs.empty() && campaign.decisions == Decisions::kImmediate) {
     map->Problem("rungs",
                  "makes samples wait for each other, which inference.decisions: immediate does "
                  "not; remove one of the two");
   }
   map->Finish();
-  if (campaign.method == Method::kDesign && !off) {
+  if (RunsAreAdded(campaign) && !off) {
     campaign_map.Problem("early_stopping",
                          "is for campaigns that infer; the runs of a design go to their ends");
     return;
   }
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
-  // to stop; the surrogate would take a bound for a value.
+  // to stop.
   if (!off && campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
-      campaign.method != Method::kSurrogateMsrs) {
+      campaign.method->bounds_runs()) {
     campaign.early_stopping = stopping;
   }
 }
@@ -317,7 +236,7 @@ void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
 void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("budget");
   if (!map) return;
-  if (campaign.method == Method::kDesign) {
+  if (RunsAreAdded(campaign)) {
     map->Ignore(map->Keys());
     campaign_map.Problem("budget",
                          "is for campaigns that infer; a design runs what is added to it");
@@ -354,31 +273,6 @@ void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
   campaign.first_proposal = std::move(proposal);
 }
 
-void CheckFreeze(MapReader& inference, const Campaign& campaign) {
-  if (!campaign.freeze.empty() && !campaign.populations.empty()) {
-    inference.Problem("freeze",
-                      absl::StrCat("does not go with parameters per experiment or batch (",
-                                   campaign.populations.front().name,
-                                   "), whose parts are not independent of each other"));
-    return;
-  }
-  std::set<std::string> held;
-  for (const auto& [iteration, freeze] : campaign.freeze) {
-    for (const std::string& name : freeze.names) {
-      const auto is_it = [&name](const CalibratedParameter& p) { return p.name == name; };
-      if (std::none_of(campaign.parameters.begin(), campaign.parameters.end(), is_it)) {
-        inference.Problem("freeze", absl::StrCat("'", name,
-                                                 "' is not calibrated here; write names "
-                                                 "of parameters, or converged alone"));
-      }
-      held.insert(name);
-    }
-  }
-  if (!held.empty() && held.size() >= campaign.parameters.size()) {
-    inference.Problem("freeze", "holds every parameter; leave at least one to be inferred");
-  }
-}
-
 void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("lineage");
   if (!map) return;
@@ -392,20 +286,21 @@ void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
 
 }  // namespace
 
-void ReadStart(MapReader& campaign_map, Campaign& campaign) {
+void ReadStart(MapReader& campaign_map, const MethodList& methods, Campaign& campaign) {
   ReadLineage(campaign_map, campaign);
   if (!campaign_map.Has("inference")) return;
-  auto map = campaign_map.Map("inference");
+  const Section section = InferenceSection(methods);
+  auto map = campaign_map.Map("inference", section);
   if (!map) return;
-  ReadRows(*map, campaign);
-  CheckFreeze(*map, campaign);
-  if (campaign.method != Method::kDesign) ReadFirstProposal(*map, campaign);
+  if (campaign.method->takes_rows()) ReadRows(*map, campaign);
+  campaign.method->Check(*map, campaign);
+  if (campaign.method->takes_first_proposal()) ReadFirstProposal(*map, campaign);
 }
 
-void ReadInference(MapReader& campaign_map, Campaign& campaign) {
+void ReadInference(MapReader& campaign_map, const MethodList& methods, Campaign& campaign) {
   ReadNoiseMode(campaign_map, campaign.filter);
-  ReadMethodSection(campaign_map, campaign);
-  ReadEarlyStopping(campaign_map, campaign);
+  ReadMethodSection(campaign_map, methods, campaign);
+  ReadEarlyStopping(campaign_map, methods, campaign);
   ReadFailure(campaign_map, campaign);
   ReadBudget(campaign_map, campaign);
   campaign.seed = campaign_map.Seed("seed").value_or(campaign.seed);
@@ -413,15 +308,12 @@ void ReadInference(MapReader& campaign_map, Campaign& campaign) {
 }
 
 void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
-  const std::size_t fewest = 2 * campaign.parameters.size() + 1;
-  if (campaign.method == Method::kSurrogateMsrs &&
-      static_cast<std::size_t>(campaign.samples) < fewest) {
-    campaign_map.Problem("inference", absl::StrCat("samples is ", campaign.samples,
-                                                   "; surrogate_msrs starts from "
-                                                   "at least ",
-                                                   fewest, " for ", campaign.parameters.size(),
-                                                   " parameters (two each and one)"));
-  }
+  const int fewest = campaign.method->fewest_samples(campaign.parameters.size());
+  if (RunsRowsOnly(campaign) || campaign.samples >= fewest) return;
+  campaign_map.Problem("inference",
+                       absl::StrCat("samples is ", campaign.samples, "; ", campaign.method->name(),
+                                    " starts from at least ", fewest, " for ",
+                                    campaign.parameters.size(), " parameters"));
 }
 
 void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign) {
@@ -432,16 +324,20 @@ void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign) {
 }
 
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign) {
-  if (!campaign.budget.model_evaluations || RunsRowsOnly(campaign.method)) return;
+  if (!campaign.budget.model_evaluations || RunsRowsOnly(campaign)) return;
   const auto fitted = std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
                                     [](const Experiment& e) { return e.role == Role::kCalibrate; });
-  const std::int64_t first = static_cast<std::int64_t>(campaign.samples) * fitted;
+  const std::int64_t first =
+      static_cast<std::int64_t>(campaign.method->FirstBatch(campaign)) * fitted;
   if (*campaign.budget.model_evaluations >= first) return;
-  campaign_map.Problem(
-      "budget", absl::StrCat("model_evaluations is ", *campaign.budget.model_evaluations,
-                             ", but the first iteration takes ", first, " (", campaign.samples,
-                             " samples, ", fitted, fitted == 1 ? " fitted test" : " fitted tests",
-                             "); allow more, or lower inference.samples"));
+  campaign_map.Problem("budget",
+                       absl::StrCat("model_evaluations is ", *campaign.budget.model_evaluations,
+                                    ", but the first iteration takes ", first, " (",
+                                    campaign.method->FirstBatch(campaign), " samples, ", fitted,
+                                    fitted == 1 ? " fitted test" : " fitted tests", "); allow more",
+                                    campaign.method->FirstBatch(campaign) == campaign.samples
+                                        ? ", or lower inference.samples"
+                                        : ""));
 }
 
 }  // namespace calib::campaign

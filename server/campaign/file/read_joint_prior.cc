@@ -273,7 +273,7 @@ void ReadJointPrior(MapReader& campaign_map, Campaign& campaign) {
                          std::string(prior.status().message()));
     return;
   }
-  if (!campaign.freeze.empty() && (constrained || correlation)) {
+  if (campaign.method->holds_parameters() && (constrained || correlation)) {
     campaign_map.Problem(constrained ? "constraints" : "prior_correlation",
                          "does not go with inference.freeze: parameters can be held only where "
                          "the priors are independent of each other");

@@ -310,7 +310,7 @@ void ReadOne(MapReader& parameters, const std::string& name, const OtherSources&
     return;
   }
   const dem::Model model = ModelWithRace(campaign);
-  const bool is_design = campaign.method == Method::kDesign;
+  const bool is_design = RunsAreAdded(campaign);
   const dem::ParameterInfo* info = is_design ? FindNumerics(name) : nullptr;
   if (info == nullptr) info = dem::FindParameter(model, name);
   SettingNamed named = FindSetting(name, others.experiments, info == nullptr && others.derived);

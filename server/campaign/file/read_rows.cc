@@ -89,15 +89,12 @@ void ReadRace(MapReader& inference, Campaign& campaign) {
 }
 
 void ReadRows(MapReader& inference, Campaign& campaign) {
-  const bool is_design = campaign.method == Method::kDesign;
-  const bool is_table = campaign.method == Method::kTable;
-  const bool beside = campaign.method == Method::kIterativeBayesianFilter && !campaign.precomputed;
-  if (!is_design && !is_table && !beside) {
-    if (inference.Has("rows")) {
-      inference.Problem("rows",
-                        "belongs to method: table, design and, with runs still to be made, "
-                        "iterative_bayesian_filter");
-    }
+  const bool is_design = RunsAreAdded(campaign);
+  const bool is_table = campaign.method->chosen_by() == ChosenBy::kFile;
+  const bool beside = !is_design && !is_table;
+  if (beside && campaign.precomputed) {
+    if (inference.Has("rows"))
+      inference.Problem("rows", "are runs to be made; these exist already");
     return;
   }
   const YamlNode* rows =

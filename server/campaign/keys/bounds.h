@@ -24,7 +24,5 @@ inline constexpr Range kGrainSize{.min = 0, .max = 10, .min_open = true};
 
 inline constexpr int kMostThreadsOfRun = 1024;
 inline constexpr std::int64_t kMostSamples = 1'000'000;
-/// Chains of tmcmc.
-inline constexpr int kFewestChains = 20;
 
 }  // namespace calib::campaign

@@ -81,7 +81,8 @@ struct Section {
   std::string title;      ///< where it stands, as people write it: "experiments[].packing"
   std::vector<Key> keys;  ///< one in capitals (NAME, PIECE) stands for every other key
   std::vector<Offered> offered = {};
-  bool closed = false;  ///< the one in capitals stands for what is offered alone
+  bool closed = false;                ///< the one in capitals stands for what is offered alone
+  std::vector<Section> of_keys = {};  ///< that its own keys alone speak of
 };
 
 /// The row of a key, that in capitals included; nullptr: the map has no such key.

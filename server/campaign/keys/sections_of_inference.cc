@@ -1,3 +1,6 @@
+#include <iterator>
+#include <map>
+
 #include "absl/strings/str_cat.h"
 #include "server/campaign/keys/bounds.h"
 #include "server/campaign/keys/sections.h"
@@ -8,68 +11,37 @@
 namespace calib::campaign {
 namespace {
 
-constexpr const char* kFilters = "filters: ";
-constexpr const char* kChains = "tmcmc: ";
-constexpr const char* kSearch = "surrogate_msrs: ";
+// "4; NAME, NAME: 1; NAME: 100"
+std::string IterationsInWords(const MethodList& methods) {
+  const int usual = methods.standard()->standard_iterations();
+  std::map<int, std::string> others;
+  for (const auto& method : methods.all()) {
+    const int own = method->standard_iterations();
+    if (own == usual || own == 0 || method->chosen_by() == ChosenBy::kRequest) continue;
+    absl::StrAppend(&others[own], others[own].empty() ? "" : ", ", method->name());
+  }
+  std::string text = absl::StrCat(usual);
+  for (const auto& [number, names] : others) absl::StrAppend(&text, "; ", names, ": ", number);
+  return text;
+}
 
-Section Inference() {
+// Of every method. Those that some do without say so where they are read.
+std::vector<Key> CommonKeys(const MethodList& methods) {
   const Campaign standard;
-  const auto text = [](auto number) { return absl::StrCat(number); };
-  const auto filters = [](const char* what) { return absl::StrCat(kFilters, what); };
-  const auto chains = [](const char* what) { return absl::StrCat(kChains, what); };
-  const auto search = [](const char* what) { return absl::StrCat(kSearch, what); };
   return {
-      "inference",
-      "inference",
-      {
-          {"method", OneWord(kMethodWords), WordOf(kMethodWords, standard.method),
-           "how parameters are found"},
-          {"samples", Whole(2, kMostSamples), text(standard.samples),
-           "of an iteration; chains (20 or more); points of the design (2 d + 1 or more of d "
-           "parameters)"},
-          {"max_iterations", Whole(1, 1000), absl::StrCat(standard.max_iterations, "; tmcmc 100"),
-           "iterations, or stages; sqmc: 1"},
-          {"replicates", Whole(0, 1000), "`realizations`, at most 16; one packing: 8",
-           "how often the best estimate is run to measure scatter; 0: not"},
-          {"first_proposal", MapOf("first_proposal"), "the prior",
-           "where the first iteration looks"},
-          {"tolerance", Number("1", kFraction), text(standard.filter.tolerance),
-           filters("relative change of the means that ends the iterations")},
-          {"ess_target", Number("1", kFraction), text(standard.filter.ess_target),
-           filters("share of effective samples of the weights that shape the next proposal")},
-          {"design", OneWord(kDesignWords), WordOf(kDesignWords, standard.filter.design),
-           filters("first iteration; the symmetric one is the maximin of 1000")},
-          {"defensive_share", Number("1", {.min = 0, .max = 1, .max_open = true}),
-           text(standard.filter.defensive_share), filters("of the prior in a proposal")},
-          {"max_components", Whole(1, 1000), text(standard.filter.max_components),
-           filters("of the proposal's mixture")},
-          {"concentration", Number("1", kPositive), text(standard.filter.concentration),
-           filters("of the proposal's mixture")},
-          {"mixture", OneWord(kMixtureWords), WordOf(kMixtureWords, standard.filter.mixture),
-           filters("what it is fitted to")},
-          {"reversed_path", TrueOrFalse(), "false",
-           filters("also the posterior along the path from the last reading to the first")},
-          {"freeze", MapOf("freeze"), "nothing", "iterative filter: what iterations hold"},
-          {"decisions", OneWord(kDecisionsWords), WordOf(kDecisionsWords, standard.decisions),
-           "with `early_stopping`, and of surrogate_msrs: by what follows from results in their "
-           "order, or by what has arrived"},
-          {"steps", Whole(1, 1000), "three a parameter, at least 10",
-           chains("Metropolis steps per stage")},
-          {"target_cv", Number("1", {.min = 0, .max = 2, .min_open = true}),
-           text(standard.tmcmc.target_cv), chains("variation of a stage's weights")},
-          {"surrogate", OneWord(kSurrogateModelWords),
-           WordOf(kSurrogateModelWords, standard.surrogate),
-           search("what predicts the misfit; the second by expected improvement")},
-          {"termination", AnyOf({Number("1", {.min = 4, .max = 1e6}), OneWord({"off"})}),
-           text(*standard.termination),
-           search("a run ends when its misfit exceeds this times the best run's")},
-          {"in_flight", Whole(1, 1000), text(standard.in_flight), search("runs under way at most")},
-          {"race", OneOrMore(Text()), "none",
-           "design: effects that a run may have, none of them in `model.effects`"},
-          {"rows", ListOf(MapOf("row")), "table: required; else none",
-           absl::StrCat("table, design (at most ", kMostRowsOfBatch,
-                        "), iterative filter: runs to be made")},
-      }};
+      {"method", OneWord(methods.Names()), std::string(methods.standard()->name()),
+       "how parameters are found"},
+      {"samples", Whole(2, kMostSamples), absl::StrCat(standard.samples),
+       "of an iteration; chains; points that a search starts from"},
+      {"max_iterations", Whole(1, 1000), IterationsInWords(methods), "iterations, or stages"},
+      {"replicates", Whole(0, 1000), "`realizations`, at most 16; one packing: 8",
+       "how often the best estimate is run to measure scatter; 0: not"},
+      {"first_proposal", MapOf("first_proposal"), "the prior", "where the first iteration looks"},
+      {"decisions", OneWord(kDecisionsWords), WordOf(kDecisionsWords, standard.decisions),
+       "with `early_stopping`, and where a method chooses while runs are under way: by what "
+       "follows "
+       "from results in their order, or by what has arrived"},
+  };
 }
 
 Section FirstProposalKeys() {
@@ -93,14 +65,6 @@ Section PlaceKeys() {
           }};
 }
 
-Section FreezeKeys() {
-  return {"freeze",
-          "inference.freeze",
-          {{"ITERATION", OneOrMore(Text()), "",
-            "parameters held from this iteration on; `converged`: those whose mean the iteration "
-            "before left alone"}}};
-}
-
 Section Row() {
   return {"row",
           "inference.rows[]",
@@ -113,8 +77,19 @@ Section Row() {
 
 }  // namespace
 
-std::vector<Section> SectionsOfInference() {
-  return {Inference(), FirstProposalKeys(), PlaceKeys(), FreezeKeys(), Row()};
+Section InferenceSection(const MethodList& methods) {
+  Section section{"inference", "inference", CommonKeys(methods)};
+  for (const auto& method : methods.all()) {
+    std::vector<Section> own = method->Keys();
+    if (own.empty()) continue;
+    for (Key& key : own.front().keys) {  // methods of one family have keys in common
+      if (FindKey(section, key.name) == nullptr) section.keys.push_back(std::move(key));
+    }
+    std::move(own.begin() + 1, own.end(), std::back_inserter(section.of_keys));
+  }
+  return section;
 }
+
+std::vector<Section> SectionsOfInference() { return {FirstProposalKeys(), PlaceKeys(), Row()}; }
 
 }  // namespace calib::campaign

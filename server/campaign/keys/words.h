@@ -3,23 +3,10 @@
 
 #include <array>
 
-#include "inference/filter/iterative_filter.h"
 #include "inference/prior/prior.h"
 #include "server/campaign/model/word_table.h"
 
 namespace calib::campaign {
-
-inline constexpr std::array kDesignWords = {
-    Word{inference::Design::kHalton, "halton"},
-    Word{inference::Design::kSobol, "sobol"},
-    Word{inference::Design::kLatinHypercube, "latin_hypercube"},
-    Word{inference::Design::kSymmetricLatinHypercube, "symmetric_latin_hypercube"},
-};
-
-inline constexpr std::array kMixtureWords = {
-    Word{inference::MixtureOver::kParameters, "parameters"},
-    Word{inference::MixtureOver::kParametersAndStates, "parameters_and_states"},
-};
 
 inline constexpr std::array kPriorWords = {
     Word{inference::PriorKind::kUniform, "uniform"},

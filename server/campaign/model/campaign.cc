@@ -8,30 +8,12 @@
 
 namespace calib::campaign {
 
-int LaterBatch(const Campaign& campaign) {
-  return campaign.method == Method::kSurrogateMsrs ? std::min(kSurrogateBatch, campaign.samples)
-                                                   : campaign.samples;
+bool RunsRowsOnly(const Campaign& campaign) {
+  return campaign.method != nullptr && RunsRowsOnly(*campaign.method);
 }
 
-int MostBatches(const Campaign& campaign) {
-  switch (campaign.method) {
-    case Method::kTmcmc:
-      return 1 + campaign.max_iterations *
-                     inference::StepsPerStage(campaign.tmcmc, campaign.parameters.size());
-    case Method::kSurrogateMsrs: {
-      const std::int64_t later =
-          (static_cast<std::int64_t>(campaign.max_iterations) - 1) * campaign.samples;
-      const int batch = LaterBatch(campaign);
-      return static_cast<int>(1 + (later + batch - 1) / batch);
-    }
-    case Method::kSqmc:
-    case Method::kTable:
-    case Method::kDesign:  // how many follow nobody knows
-      return 1;
-    case Method::kIterativeBayesianFilter:
-      break;
-  }
-  return campaign.precomputed ? 1 : campaign.max_iterations;
+bool RunsAreAdded(const Campaign& campaign) {
+  return campaign.method != nullptr && campaign.method->chosen_by() == ChosenBy::kRequest;
 }
 
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,7 +16,7 @@
 #include "inference/data/data_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
-#include "inference/tmcmc/tmcmc.h"
+#include "server/campaign/model/method.h"
 #include "server/campaign/model/population.h"
 #include "server/campaign/model/program.h"
 #include "server/campaign/model/tied_parameters.h"
@@ -45,7 +46,7 @@ double ErrorOf(const NoiseLaw& law, double value);
 struct MeasuredObservable {
   std::string name;
   /// One per row of the file, SI, compression positive, strains logarithmic, NaN where a reading is
-  /// missing; none where the observable is only predicted (method table).
+  /// missing; none where the observable is only predicted (RunsRowsOnly).
   std::vector<double> values;
   /// One per row, > 0, NaN where a reading is missing (may be empty with ess_target).
   std::vector<double> sd;
@@ -190,12 +191,6 @@ struct Lineage {
   std::string purpose;  ///< a word of kDerivedForWords, or a user's own
 };
 
-/// Parameters that an iteration of the filter and all later ones hold at their mean so far.
-struct Freeze {
-  bool converged = false;          ///< those whose mean the iteration before has left alone
-  std::vector<std::string> names;  ///< and these
-};
-
 inline constexpr std::array kNoiseModeWords = {
     Word{inference::NoiseMode::kGiven, "given"},
     Word{inference::NoiseMode::kInferred, "inferred"},
@@ -209,15 +204,8 @@ struct SharedNoise {
   inference::VarianceFactorPrior prior = {};
 };
 
-/// What surrogate_msrs asks where to look next.
-enum class SurrogateModel { kCubicRbf, kGaussianProcess };
-inline constexpr std::array kSurrogateModelWords = {
-    Word{SurrogateModel::kCubicRbf, "cubic_rbf"},
-    Word{SurrogateModel::kGaussianProcess, "gaussian_process"},
-};
-
-/// When a campaign decides while runs are under way (the next point of surrogate_msrs, which run
-/// to end early). kReproducible: by what follows from results in their order, whatever arrived
+/// When a campaign decides while runs are under way (which is the next point, which run to end
+/// early). kReproducible: by what follows from results in their order, whatever arrived
 /// first; kImmediate: at once, by what has arrived.
 enum class Decisions { kReproducible, kImmediate };
 inline constexpr std::array kDecisionsWords = {
@@ -277,30 +265,25 @@ struct Campaign {
   /// Tests that may be proposed to a program: experiments without readings, `control` as they would
   /// be driven.
   std::vector<Experiment> next{};
-  Method method = Method::kIterativeBayesianFilter;
+  /// With its options; nullptr only of a campaign that was not read.
+  std::shared_ptr<const Method> method{};
   int samples = 100;
-  /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.
   int max_iterations = 4;
-  std::optional<Table> table;  ///< with kTable; with kDesign the batch that it starts with
-  /// With kDesign: effects that a run may have or lack (race.h). None of them is part of `model`.
+  /// Rows of the file: all there is (ChosenBy::kFile), the batch to start with (kRequest), or what
+  /// comes before the method's own.
+  std::optional<Table> table;
+  /// With ChosenBy::kRequest: effects that a run may have or lack (race.h). None of them is part of
+  /// `model`.
   std::vector<std::string> race{};
   std::optional<FirstProposal> first_proposal;
   /// How often the best estimate is run to measure the scatter of packings; empty: as its number.
   std::optional<int> replicates;
   std::optional<Lineage> lineage;
-  std::map<int, Freeze> freeze;  ///< by iteration, from 1
   std::vector<SharedNoise> shared_noise;
   std::vector<inference::ModelError> model_errors{};
+  /// noise, ess_target and seed are of every method, the rest of those that weigh samples.
   inference::FilterOptions filter;
-  SurrogateModel surrogate = SurrogateModel::kCubicRbf;
-  /// With surrogate_msrs a run ends when its misfit so far exceeds this times the best run's (a
-  /// half and a quarter of it later, inference::TerminationBound); empty: never.
-  std::optional<double> termination = 10;
-  /// With surrogate_msrs the points under way at most, >= 1. With kReproducible point k is chosen
-  /// once all up to k - in_flight have ended, and by their results alone.
-  int in_flight = 8;
   Decisions decisions = Decisions::kReproducible;
-  inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
   Resources resources{};
@@ -308,14 +291,9 @@ struct Campaign {
   std::uint64_t seed = 0;
 };
 
-/// Points of surrogate_msrs that make an iteration after the first; they are chosen one by one.
-inline constexpr int kSurrogateBatch = 8;
-
-/// Samples of an iteration after the first.
-int LaterBatch(const Campaign& campaign);
-/// The most batches it can come to: iterations of a filter, Metropolis steps of tmcmc and its prior
-/// draws, eights of surrogate_msrs.
-int MostBatches(const Campaign& campaign);
+/// True where runs are made and nothing is inferred from them; where runs are added while it lives.
+bool RunsRowsOnly(const Campaign& campaign);
+bool RunsAreAdded(const Campaign& campaign);
 
 /// Path length of the control at each reading: the distance in the correlation of errors. Readings
 /// closer than 1 % of the correlation length count as that far apart, because errors of two

@@ -75,7 +75,7 @@ std::string WhereItActs(const dem::EffectInfo& effect) {
 
 std::vector<std::string> EffectsWithoutPart(const Campaign& campaign) {
   std::vector<std::string> found;
-  if (campaign.table || RunsRowsOnly(campaign.method) || campaign.lineage) return found;
+  if (campaign.table || RunsRowsOnly(campaign) || campaign.lineage) return found;
   for (const std::string& name : campaign.model.effects) {
     const dem::EffectInfo* const effect = dem::FindEffect(campaign.model.user_effects, name);
     if (effect == nullptr) continue;

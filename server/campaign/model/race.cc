@@ -113,7 +113,7 @@ std::map<std::string, double> NumericsOf(const Campaign& campaign, std::span<con
   std::map<std::string, double> told;
   if (!campaign.program) return told;
   for (const auto& [name, choice] : campaign.program->numerics) told[name] = choice.null;
-  if (campaign.method != Method::kDesign) return told;
+  if (!RunsAreAdded(campaign)) return told;
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const std::string& name = campaign.parameters[j].name;
     if (IsNumerics(campaign, name)) told[name.substr(PrefixOfNumerics().size())] = values[j];
@@ -137,7 +137,7 @@ dem::Model ModelWithRace(const Campaign& campaign) {
 }
 
 std::optional<double> NullOf(const Campaign& campaign, const std::string& parameter) {
-  if (campaign.method != Method::kDesign) return std::nullopt;
+  if (!RunsAreAdded(campaign)) return std::nullopt;
   if (IsNumerics(campaign, parameter)) {
     return campaign.program ? NumericsOfProgram(campaign, parameter)->null
                             : FindNumerics(parameter)->null_value;
@@ -182,7 +182,7 @@ dem::Model ModelOf(const Campaign& campaign, const Experiment& experiment,
   dem::Model model = campaign.model;
   const std::vector<std::string> active = ActiveEffects(campaign, values);
   model.effects.insert(model.effects.end(), active.begin(), active.end());
-  const bool is_design = campaign.method == Method::kDesign;
+  const bool is_design = RunsAreAdded(campaign);
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const std::string& name = campaign.parameters[j].name;
     const std::string effect = EffectNamedIn(name);
@@ -202,7 +202,7 @@ dem::Model ModelOf(const Campaign& campaign, const Experiment& experiment,
 void ChangeNumerics(const Campaign& campaign, const Experiment& experiment, const RunOf& run,
                     dem::Scenario& scenario) {
   const std::vector<double>& values = run.values;
-  if (campaign.method != Method::kDesign || !ReadAtRest(experiment)) return;
+  if (!RunsAreAdded(campaign) || !ReadAtRest(experiment)) return;
   std::optional<dem::Staging> used;
   for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
     const dem::ParameterInfo* factor = FindNumerics(campaign.parameters[j].name);

@@ -27,7 +27,7 @@ bool HasOnePacking(const Experiment& experiment) {
 }
 
 int ReplicatesOf(const Campaign& campaign) {
-  if (campaign.precomputed || RunsRowsOnly(campaign.method) ||
+  if (campaign.precomputed || RunsRowsOnly(campaign) ||
       campaign.filter.noise == inference::NoiseMode::kEssTarget) {
     return 0;
   }

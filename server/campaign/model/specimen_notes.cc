@@ -44,27 +44,7 @@ std::string ScatterLeftOut(const Campaign& campaign) {
     return "";
   const std::string what =
       packings ? "what runs on different packings differ by" : "what twins of a run differ by";
-  switch (campaign.method) {
-    case Method::kTmcmc:
-      return absl::StrCat("tmcmc compares runs by the stated errors alone: ", what,
-                          " is not in them, a lucky run holds its chain, and the intervals are too "
-                          "narrow. iterative_bayesian_filter takes it in.");
-    case Method::kSurrogateMsrs:
-      return absl::StrCat("surrogate_msrs compares runs by the stated errors alone: ", what,
-                          " is not in them, and the best point owes a part of its lead to a lucky "
-                          "run. A posterior from the emulator contains it.");
-    case Method::kSqmc:
-    case Method::kIterativeBayesianFilter:
-      if (campaign.filter.noise != inference::NoiseMode::kInferred) return "";
-      return absl::StrCat("With noise inferred ", what,
-                          " is in no error of a posterior from weights: the factors take it for "
-                          "noise of the readings. One from the emulator contains it, and with "
-                          "noise: given it is measured and taken in.");
-    case Method::kTable:
-    case Method::kDesign:
-      break;
-  }
-  return "";
+  return campaign.method == nullptr ? "" : campaign.method->ScatterLeftOut(campaign, what);
 }
 
 std::vector<std::string> SpecimenNotes(const Campaign& campaign) {

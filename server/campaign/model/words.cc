@@ -2,14 +2,6 @@
 
 namespace calib::campaign {
 
-const char* ToString(Method method) { return WordOf(kMethodWords, method); }
-
-bool IsFilter(Method method) {
-  return method == Method::kSqmc || method == Method::kIterativeBayesianFilter;
-}
-
-bool RunsRowsOnly(Method method) { return method == Method::kTable || method == Method::kDesign; }
-
 const char* ToString(CampaignState state) { return WordOf(kCampaignStateWords, state); }
 
 std::optional<CampaignState> ToCampaignState(std::string_view word) {

@@ -11,23 +11,6 @@
 
 namespace calib::campaign {
 
-/// kTable: the rows of Campaign::table are run, nothing is inferred. kDesign: likewise, and further
-/// rows are added while it lives; each may have effects of Campaign::race.
-enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs, kTable, kDesign };
-inline constexpr std::array kMethodWords = {
-    Word{Method::kSqmc, "sqmc"},
-    Word{Method::kIterativeBayesianFilter, "iterative_bayesian_filter"},
-    Word{Method::kTmcmc, "tmcmc"},
-    Word{Method::kSurrogateMsrs, "surrogate_msrs"},
-    Word{Method::kTable, "table"},
-    Word{Method::kDesign, "design"},
-};
-const char* ToString(Method method);
-/// True where runs are made and nothing is inferred from them by the server.
-bool RunsRowsOnly(Method method);
-/// True for the two filters, whose posterior is that of weighted samples.
-bool IsFilter(Method method);
-
 /// Of a campaign's model: what becomes of a shear force where its stiffness falls.
 inline constexpr std::array kShearUnloadingWords = {
     Word{dem::ShearUnloading::kAsPublished, "as_published"},

@@ -41,7 +41,7 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
           {"posterior.json",
-           messages::RunsRowsOnly(view.status)
+           view.status.infers_nothing()
                ? report::TablePosteriorJson(view.status)
                : report::PosteriorJson(
                      view.posterior, view.campaign.parameters,

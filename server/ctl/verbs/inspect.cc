@@ -17,6 +17,7 @@
 #include "server/inspection/campaign_draft.h"
 #include "server/inspection/inspect_file.h"
 #include "server/inspection/inspection_json.h"
+#include "server/methods/registry.h"
 #include "server/report/text/text_table.h"
 
 namespace calib::ctl {
@@ -127,8 +128,8 @@ absl::StatusOr<int> WriteCampaign(const CommonOptions& common, const InspectOpti
                    inspection::CampaignDraft(files, {.test = options.test,
                                                      .campaign_file = options.campaign,
                                                      .sheet = options.sheet}));
-  const campaign::ReadOutcome outcome =
-      campaign::ReadCampaign(text, options.campaign, campaign::DiskReader(options.campaign));
+  const campaign::ReadOutcome outcome = campaign::ReadCampaign(
+      methods::All(), text, options.campaign, campaign::DiskReader(options.campaign));
   for (const campaign::Problem& problem : outcome.problems) {
     std::cerr << campaign::ToString(problem) << "\n";
   }

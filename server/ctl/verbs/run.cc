@@ -76,7 +76,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::s
 
 absl::StatusOr<int> PrintAnswer(client::Session& session, const std::string& campaign, bool json) {
   ASSIGN_OR_RETURN(const auto view, client::LoadView(session.client(), campaign));
-  if (messages::RunsRowsOnly(view.status)) {
+  if (view.status.infers_nothing()) {
     std::cout << (json ? report::TablePosteriorJson(view.status) : TableText(view.status));
     return kDone;
   }

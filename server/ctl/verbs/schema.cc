@@ -3,6 +3,7 @@
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
+#include "server/methods/registry.h"
 #include "server/report/documents/campaign_schema.h"
 
 namespace calib::ctl {
@@ -17,7 +18,8 @@ void DeclareSchema(OptionList& list, SchemaOptions& options) {
 }
 
 absl::StatusOr<int> Schema(const CommonOptions&, const SchemaOptions& options) {
-  std::cout << (options.reference ? report::KeyReference() : report::CampaignSchema());
+  std::cout << (options.reference ? report::KeyReference(methods::All())
+                                  : report::CampaignSchema(methods::All()));
   return kDone;
 }
 

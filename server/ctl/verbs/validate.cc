@@ -106,7 +106,7 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
   std::cout << options.file << " is good: " << campaign.parameters.size() << " parameters, "
             << campaign.experiments.size() << " experiment(s), " << readings
             << " measured numbers, ";
-  if (campaign::RunsRowsOnly(campaign.method)) {
+  if (campaign::RunsRowsOnly(campaign)) {
     std::cout << (campaign.table ? campaign.table->like.size() : 0) << " row(s) to run.\n";
   } else if (campaign.precomputed) {
     const auto with = campaign.precomputed->with_effects.parameters.rows();
@@ -114,8 +114,7 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
     if (with > 0) std::cout << ", and " << with << " with effects, for diagnose";
     std::cout << ".\n";
   } else {
-    std::cout << campaign.samples << " samples in each of at most " << campaign.max_iterations
-              << " iteration(s).\n";
+    std::cout << campaign.method->RunsInWords(campaign) << ".\n";
   }
   if (campaign.program) std::cout << ProgramText(*campaign.program);
   for (const std::string& note : notes) std::cout << report::Wrapped(note, "  ", "  ");

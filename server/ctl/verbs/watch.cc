@@ -54,7 +54,7 @@ absl::StatusOr<int> Watch(const CommonOptions& common, const WatchOptions& optio
   const bool good = last && messages::StateOf(*last) == campaign::CampaignState::kFinished;
   if (last && !common.json) {
     std::cout << last->campaign() << " is " << client::ProgressText(*last) << ".\n";
-    if (good && !messages::RunsRowsOnly(*last)) {
+    if (good && !last->infers_nothing()) {
       ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
       std::cout << report::FitPlots(report::Curves(view, report::PredictReadings(view)), kPlots,
                                     ThisTerminal());

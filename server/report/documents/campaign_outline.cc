@@ -12,6 +12,7 @@
 #include "server/campaign/checks/in_words.h"
 #include "server/campaign/checks/test_ties.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/methods/registry.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
@@ -175,8 +176,8 @@ absl::StatusOr<std::string> CampaignOutline(const std::string& test_name,
       Comment(test.description, "    "), "    test: ", test.name, "\n", SettingsOf(test),
       SpecimenOf(test), MeasurementsOf(test),
       Comment("an experiment that is not fitted, but judges the fit: validate", "    "),
-      "    role: calibrate\n", "inference: {method: iterative_bayesian_filter, samples: 64}\n",
-      "seed: 1\n");
+      "    role: calibrate\n", "inference: {method: ", methods::All().standard()->name(),
+      ", samples: 64}\n", "seed: 1\n");
 }
 
 }  // namespace calib::report

@@ -131,6 +131,10 @@ Json PosteriorFields(const v1::Posterior& p,
     if (error.has_absolute()) entry["absolute"] = size_of(error.absolute());
     model_error.push_back(std::move(entry));
   }
+  Json batches = Json::array();
+  for (const auto& batch : p.batches()) {
+    batches.push_back({{"runs", batch.runs()}, {"expected_gain", batch.expected_gain()}});
+  }
   Json correlation = Json::array();
   const int d = p.parameters_size();
   for (int i = 0; i < d && p.correlation_size() == d * d; ++i) {
@@ -158,6 +162,7 @@ Json PosteriorFields(const v1::Posterior& p,
           {"noise", p.noise()},
           {"noise_scale", noise_scale},
           {"model_error", model_error},
+          {"batches", batches},
           {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
           {"path", Path(p.path(), order)},
           {"reversed_path", Path(p.reversed_path(), order)},

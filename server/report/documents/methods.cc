@@ -137,48 +137,12 @@ std::string MethodSentence(const CampaignView& view, Citations& cited) {
   const campaign::Campaign& campaign = view.campaign;
   const std::string runs = fmt::format("{} model evaluations, seed {}",
                                        view.posterior.model_evaluations(), campaign.seed);
-  switch (campaign.method) {
-    case campaign::Method::kSqmc:
-      return "Sequential quasi-Monte Carlo filter" +
-             cited.Cite(
-                 "Cheng H, Shuku T, Thoeni K, Yamamoto H (2018) Probabilistic calibration "
-                 "of discrete element simulations using the sequential quasi-Monte Carlo "
-                 "filter. Granular Matter 20:11") +
-             fmt::format(", {} samples; {}.", campaign.samples, runs);
-    case campaign::Method::kIterativeBayesianFilter:
-      return "Iterative Bayesian filter" +
-             cited.Cite(
-                 "Cheng H, Shuku T, Thoeni K, Tempone P, Luding S, Magnanimo V (2019) An "
-                 "iterative Bayesian filtering framework for fast and automated "
-                 "calibration of DEM models. Comput Methods Appl Mech Eng 350:268–294") +
-             fmt::format(", {} iterations of {} samples; {}.", view.posterior.iterations(),
-                         campaign.samples, runs);
-    case campaign::Method::kTmcmc:
-      return "Transitional Markov chain Monte Carlo" +
-             cited.Cite(
-                 "Ching J, Chen YC (2007) Transitional Markov chain Monte Carlo method for "
-                 "Bayesian model updating, model class selection, and model averaging. "
-                 "J Eng Mech 133:816–832") +
-             cited.Cite(
-                 "Hadjidoukas PE, Angelikopoulos P, Rossinelli D, Alexeev D, Papadimitriou "
-                 "C, Koumoutsakos P (2014) Bayesian uncertainty quantification and "
-                 "propagation for discrete element simulations of granular materials. "
-                 "Comput Methods Appl Mech Eng 282:218–238") +
-             fmt::format(", {} chains; {}.", campaign.samples, runs);
-    case campaign::Method::kSurrogateMsrs:
-      return "Minimum sought by a metric stochastic response surface" +
-             cited.Cite(
-                 "Regis RG, Shoemaker CA (2007) A stochastic radial basis function method "
-                 "for the global optimization of expensive functions. INFORMS J Comput "
-                 "19:497–509") +
-             cited.Cite(
-                 "Samuelsson A (2023) Parallel optimization for model calibration of large "
-                 "scale particle systems. Master's thesis, Chalmers University of "
-                 "Technology, Gothenburg") +
-             fmt::format("; {}.", runs);
-    case campaign::Method::kTable:
-    case campaign::Method::kDesign:
-      break;
+  const campaign::MethodInWords method =
+      campaign.method->InWords(campaign, view.posterior.iterations());
+  if (!method.name.empty()) {
+    std::string cites;
+    for (const std::string& reference : method.references) cites += cited.Cite(reference);
+    return fmt::format("{}{}{}; {}.", method.name, cites, method.detail, runs);
   }
   return fmt::format("A table of {} parameter sets was run.", view.samples.size());
 }
@@ -225,7 +189,7 @@ Methods MethodsOf(const CampaignView& view) {
   }
   if (!fixed.empty()) say("Held fixed (SI): " + Listed(fixed) + ".");
   say(DataSentence(campaign));
-  if (!campaign::RunsRowsOnly(campaign.method)) say(ErrorSentence(campaign));
+  if (!campaign::RunsRowsOnly(campaign)) say(ErrorSentence(campaign));
   say(MethodSentence(view, cited));
   if (view.posterior.parameters_size() > 0) say(SourceSentence(view.posterior));
   methods.references = cited.Take();

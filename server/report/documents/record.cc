@@ -99,10 +99,9 @@ Json Entries(const CampaignView& view) {
     add("engine", dem::EngineVersion());
   }
   add("seed", std::to_string(campaign.seed));
-  if (!campaign::RunsRowsOnly(campaign.method)) {
+  if (!campaign::RunsRowsOnly(campaign)) {
     add("errors", NoiseInWords(campaign));
-    add("samples", fmt::format("{} per iteration, at most {} iterations", campaign.samples,
-                               campaign.max_iterations));
+    add("samples", campaign.method->RunsInWords(campaign));
     add("stopped early", StoppingInWords(view.posterior));
   }
   add("effort", fmt::format("{} model evaluations, {} core hours", view.status.model_evaluations(),

@@ -144,8 +144,8 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
         "The errors of the readings are not stated as in ", rivals.front().posterior.campaign(),
         ": ", others, "; the evidence compares models and errors together, not the models alone."));
   }
-  const std::string methods =
-      names([&first](const RivalModel& r) { return r.campaign.method != first.method; });
+  const std::string methods = names(
+      [&first](const RivalModel& r) { return r.campaign.method->name() != first.method->name(); });
   if (!methods.empty()) {
     warnings.push_back(
         absl::StrCat("The evidence was not found by the same method as that of ",

@@ -32,7 +32,7 @@ std::string NextCommand(const v1::CampaignStatus& status, const StoredDiagnosis*
     case campaign::CampaignState::kPaused:
       return absl::StrCat("calibctl resume ", id);
     case campaign::CampaignState::kFinished:
-      return absl::StrCat("calibctl ", messages::RunsRowsOnly(status)
+      return absl::StrCat("calibctl ", status.infers_nothing()
                                            ? absl::StrCat("export ", id, " -o ", id)
                                            : OfFinished(id, diagnosis, improved));
     case campaign::CampaignState::kFailed:

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -297,7 +298,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"FewPointsToStartFrom", "method: iterative_bayesian_filter, samples: 20",
                 "method: surrogate_msrs, samples: 8",
                 "c.yaml:36: inference: samples is 8; surrogate_msrs starts from at least 9 for 4 "
-                "parameters (two each and one)"},
+                "parameters"},
         Mistake{"BudgetBelowOneIteration", "model_evaluations: 400", "model_evaluations: 19",
                 "c.yaml:39: budget: model_evaluations is 19, but the first iteration takes 20 (20 "
                 "samples, 1 "
@@ -318,8 +319,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"ChainsDecideNothingAtOnce", "method: iterative_bayesian_filter",
                 "method: tmcmc, decisions: immediate",
                 "c.yaml:36: inference.decisions: tmcmc decides nothing while runs are under way; "
-                "immediate is for surrogate_msrs, and for sqmc and iterative_bayesian_filter with "
-                "early_stopping"},
+                "immediate is for iterative_bayesian_filter, sqmc and surrogate_msrs"},
         Mistake{"RungsAndAtOnce", "max_iterations: 3}\nearly_stopping: {discard_at_most: 1e-3}",
                 "max_iterations: 3, decisions: immediate}\n"
                 "early_stopping: {discard_at_most: 1e-3, rungs: [0.5]}",
@@ -337,8 +337,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "c.yaml:36: inference.design: 'lattice' is unknown; allowed: halton, sobol, "
                 "latin_hypercube, symmetric_latin_hypercube"},
         Mistake{"NoSuchMethod", "method: iterative_bayesian_filter", "method: iterative_filter",
-                "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: sqmc, "
-                "iterative_bayesian_filter, tmcmc, surrogate_msrs, table, design"},
+                "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: "
+                "iterative_bayesian_filter, sqmc, tmcmc, surrogate_msrs, adaptive_emulator, table, "
+                "design"},
         Mistake{"HalfASample", "samples: 20", "samples: 20.5",
                 "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
         Mistake{"OneReplicate", "max_iterations: 3}", "max_iterations: 3, replicates: 1}",
@@ -508,7 +509,7 @@ TEST(BadCampaigns, StressesFarBelowTheConfiningPressureAreWarnedOf) {
   const std::string yaml =
       Spoiled("{q_over_p: {noise: {relative: 0.05}}}", "{axial_stress: {noise: {relative: 0.05}}}");
   EXPECT_EQ(ProblemsOf(yaml, files), "");
-  const auto odd = ReadCampaign(yaml, "c.yaml", ReaderOf(files)).warnings;
+  const auto odd = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files)).warnings;
   ASSERT_EQ(odd.size(), 1U);
   EXPECT_EQ(odd[0].kind, WarningKind::kUnit);
   EXPECT_THAT(Sentence(odd[0]), HasSubstr("tx05, axial_stress: begins at 0.6 Pa, where the test "

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/campaign/model/identity.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -26,7 +27,7 @@ using ::testing::SizeIs;
 using testing::Spoiled;
 
 ReadOutcome Read(const std::string& yaml) {
-  ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   return outcome;
 }
@@ -98,8 +99,9 @@ TEST(CampaignFile, AnInfinitePartnerIsAWall) {
   for (const char* radius : {"inf", ".inf", "2 cm"}) {
     const std::string yaml =
         Impact(std::string("impact_speed: 1 m/s\n    partner_radius: ") + radius, "impact_angle");
-    const ReadOutcome outcome = ReadCampaign(
-        yaml, "c.yaml", ReaderOf({{"impact.csv", "impact_angle,normal_restitution\n0.3,1\n"}}));
+    const ReadOutcome outcome =
+        ReadCampaign(methods::All(), yaml, "c.yaml",
+                     ReaderOf({{"impact.csv", "impact_angle,normal_restitution\n0.3,1\n"}}));
     for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
     EXPECT_EQ(std::isinf(outcome.campaign.experiments.at(0).settings.at("partner_radius")),
               radius != std::string("2 cm"));
@@ -173,10 +175,11 @@ TEST(CampaignFile, ReadingsThatDifferInTheLastDigitsAreAtOneControl) {
 TEST(CampaignFile, WhatWasAcceptedOnceIsNotAskedAgainWhetherItsRunsAreOfUse) {
   const std::string yaml = Spoiled("model_evaluations: 400", "model_evaluations: 19");
   const auto files = GoodFiles();
-  EXPECT_THAT(ReadCampaign(yaml, "c.yaml", ReaderOf(files)).problems, SizeIs(1));
-  EXPECT_THAT(
-      ReadCampaign(yaml, "c.yaml", ReaderOf(files), std::nullopt, CampaignIs::kStored).problems,
-      IsEmpty());
+  EXPECT_THAT(ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files)).problems, SizeIs(1));
+  EXPECT_THAT(ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files), std::nullopt,
+                           CampaignIs::kStored)
+                  .problems,
+              IsEmpty());
 }
 
 TEST(CampaignFile, ADenseCurveKeepsTheDistancesOfItsReadings) {
@@ -198,7 +201,8 @@ TEST(CampaignFile, MakesTheScenarioOfASample) {
 }
 
 TEST(CampaignFile, ASeedOnTheCommandLineWins) {
-  const ReadOutcome outcome = ReadCampaign(GoodYaml(), "c.yaml", ReaderOf(GoodFiles()), 99);
+  const ReadOutcome outcome =
+      ReadCampaign(methods::All(), GoodYaml(), "c.yaml", ReaderOf(GoodFiles()), 99);
   EXPECT_EQ(outcome.campaign.seed, 99U);
   EXPECT_EQ(outcome.campaign.filter.seed, 99U);
 }
@@ -244,7 +248,7 @@ TEST(CampaignFile, FullCovarianceOfTheErrors) {
       "0 0 0 0.04 0 0\n0 0 0 0 0.09 0\n0,0,0,0,0,0.09\n";
   const std::string yaml = Spoiled("{absolute: 0.1 percent, correlation_length: 0.5 percent}",
                                    "{covariance: covariance.txt}");
-  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   const MeasuredObservable& volume = outcome.campaign.experiments[0].observables[1];
   ASSERT_THAT(volume.sd, SizeIs(6));
@@ -399,7 +403,7 @@ TEST(CampaignFile, AControlThatIsASettingHasItsRange) {
   for (const std::string speed : {"-2", "0"}) {  // at a speed of 0 nothing collides
     SCOPED_TRACE(speed);
     const ReadOutcome outcome = ReadCampaign(
-        yaml, "c.yaml",
+        methods::All(), yaml, "c.yaml",
         ReaderOf({{"impact.csv", "impact_speed,normal_restitution\n1,0.9\n" + speed + ",0.9\n"}}));
     ASSERT_THAT(outcome.problems, SizeIs(1));
     EXPECT_EQ(ToString(outcome.problems[0]), "impact.csv:3: impact_speed: is " + speed +
@@ -493,8 +497,7 @@ TEST(CampaignFile, ReadsWhatIsHeldWhen) {
                                   "reversed_path: true, replicates: 5, "
                                   "mixture: parameters_and_states}"))
                          .campaign;
-  EXPECT_THAT(c.freeze.at(1).names, ElementsAre("young_modulus"));
-  EXPECT_TRUE(c.freeze.at(2).converged);
+  EXPECT_TRUE(c.method->holds_parameters());
   EXPECT_TRUE(c.filter.reversed_path);
   EXPECT_EQ(c.replicates, 5);
   EXPECT_EQ(c.filter.mixture, inference::MixtureOver::kParametersAndStates);

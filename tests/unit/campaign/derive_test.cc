@@ -5,6 +5,7 @@
 
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/file/text/yaml_text.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -28,6 +29,7 @@ TEST(YamlText, ReadsBackToTheSameTree) {
 
 TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
   const auto text = Derive(
+      methods::All(),
       "name: a\nmodel: {contact: linear}\nparameters: {young_modulus: default}\n"
       "experiments:\n  - {name: x, staging: {rate: 0.2 1/s}}\n  - {name: z}\n"
       "  - {name: y, role: validate}\n",
@@ -73,16 +75,17 @@ class DerivedFrom : public ::testing::TestWithParam<const char*> {
 
 TEST_P(DerivedFrom, AnExtensionIsCalibratedAsItsParent) {
   const std::string parent = Parent();
-  const auto text = Derive(parent, {.name = "extension",
-                                    .lineage = {.parent = "c1", .purpose = "extension"},
-                                    .effects = {"twisting_resistance"},
-                                    .parameters = kNew,
-                                    .first_proposal = FirstProposal{}});
+  const auto text = Derive(methods::All(), parent,
+                           {.name = "extension",
+                            .lineage = {.parent = "c1", .purpose = "extension"},
+                            .effects = {"twisting_resistance"},
+                            .parameters = kNew,
+                            .first_proposal = FirstProposal{}});
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_EQ(testing::ProblemsOf(*text), "") << *text;
   const FileReader files = testing::ReaderOf(testing::GoodFiles());
-  EXPECT_EQ(ReadCampaign(*text, "c.yaml", files).campaign.method,
-            ReadCampaign(parent, "c.yaml", files).campaign.method);
+  EXPECT_EQ(ReadCampaign(methods::All(), *text, "c.yaml", files).campaign.method->name(),
+            ReadCampaign(methods::All(), parent, "c.yaml", files).campaign.method->name());
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -95,10 +98,11 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(Derive, AnExtensionOfOneIterationMayHaveMore) {
   const auto text =
-      Derive("name: a\ninference: {method: sqmc, samples: 96, design: sobol, freeze: {2: [x]}}\n",
+      Derive(methods::All(),
+             "name: a\ninference: {method: sqmc, samples: 96, design: sobol, freeze: {2: [x]}}\n",
              {.name = "b",
               .lineage = {.parent = "c1", .purpose = "extension"},
-              .method = Method::kIterativeBayesianFilter,
+              .method = "iterative_bayesian_filter",
               .samples = 15,
               .max_iterations = 6});
   ASSERT_TRUE(text.ok()) << text.status();
@@ -118,11 +122,11 @@ TEST(Derive, ATableHasNoGroupsOfNoise) {
     const Derivation table{.name = "b",
                            .lineage = {.parent = "c1", .purpose = "prediction"},
                            .rows = {{.like = 0, .values = {{"k", 1}}}}};
-    const auto text = Derive(parent, table);
+    const auto text = Derive(methods::All(), parent, table);
     ASSERT_TRUE(text.ok()) << text.status();
     EXPECT_THAT(*text, HasSubstr(left));
     EXPECT_EQ(text->find("noise") == std::string::npos, left.empty()) << *text;
-    const auto extension = Derive(parent, {.name = "b", .lineage = table.lineage});
+    const auto extension = Derive(methods::All(), parent, {.name = "b", .lineage = table.lineage});
     ASSERT_TRUE(extension.ok()) << extension.status();
     EXPECT_THAT(*extension, HasSubstr("noise")) << "it infers, as its parent does";
   }
@@ -130,10 +134,11 @@ TEST(Derive, ATableHasNoGroupsOfNoise) {
 
 TEST(Derive, ABudgetTakesThePlaceOfTheParents) {
   const std::string parent = "name: a\nbudget: {model_evaluations: 400, core_hours: 2}\n";
-  const auto text = Derive(parent, {.name = "b",
-                                    .lineage = {.parent = "c1", .purpose = "extension"},
-                                    .first_proposal = std::nullopt,
-                                    .model_evaluations = 37});
+  const auto text = Derive(methods::All(), parent,
+                           {.name = "b",
+                            .lineage = {.parent = "c1", .purpose = "extension"},
+                            .first_proposal = std::nullopt,
+                            .model_evaluations = 37});
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_NE(text->find("budget: {model_evaluations: 37, core_hours: 2}"), std::string::npos)
       << *text;

@@ -7,6 +7,7 @@
 #include "dem/registry/catalog.h"
 #include "server/campaign/file/derive.h"
 #include "server/campaign/model/race.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -46,14 +47,15 @@ const std::string kRow =
 
 Campaign ReadDesign(const std::string& yaml) {
   EXPECT_EQ(ProblemsOf(yaml), "") << yaml;
-  return ReadCampaign(yaml, "c.yaml", testing::ReaderOf(testing::GoodFiles())).campaign;
+  return ReadCampaign(methods::All(), yaml, "c.yaml", testing::ReaderOf(testing::GoodFiles()))
+      .campaign;
 }
 
 TEST(Design, IsReadWithItsRaceAndItsFirstRows) {
   const Campaign c = ReadDesign(
       DesignYaml(kCell, ", race: [load_cell_error], rows: [{" + kRow +
                             ", load_cell_error.gain: 0, load_cell_error.offset: 0, like: 4}]"));
-  EXPECT_EQ(c.method, Method::kDesign);
+  EXPECT_EQ(c.method->name(), "design");
   EXPECT_THAT(c.race, ElementsAre("load_cell_error"));
   EXPECT_THAT(c.model.effects, ElementsAre("rolling_resistance"));
   EXPECT_EQ(c.samples, kMostRowsOfBatch);
@@ -156,7 +158,7 @@ TEST(Design, RefusesWhatItCannotRun) {
 
 TEST(Design, FollowsFromItsBase) {
   const auto text =
-      Derive(testing::GoodYaml(),
+      Derive(methods::All(), testing::GoodYaml(),
              {.name = "sand: race",
               .lineage = {.parent = "c1", .purpose = "design"},
               .parameters = {{"load_cell_error.gain", {.kind = "uniform", .min = -0.3, .max = 0.3}},
@@ -166,7 +168,7 @@ TEST(Design, FollowsFromItsBase) {
               .race = std::vector<std::string>{"load_cell_error"}});
   ASSERT_TRUE(text.ok()) << text.status();
   const Campaign c = ReadDesign(*text);
-  EXPECT_EQ(c.method, Method::kDesign);
+  EXPECT_EQ(c.method->name(), "design");
   EXPECT_EQ(c.experiments.size(), 1U);
   EXPECT_THAT(c.race, ElementsAre("load_cell_error"));
   EXPECT_FALSE(c.budget.model_evaluations || c.early_stopping);

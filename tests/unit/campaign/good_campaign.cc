@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "server/methods/registry.h"
+
 namespace calib::campaign::testing {
 
 namespace {
@@ -97,7 +99,8 @@ std::string Spoiled(const std::string& from, const std::string& to) {
 
 std::string ProblemsOf(const std::string& yaml, const std::map<std::string, std::string>& files) {
   std::string text;
-  for (const Problem& problem : ReadCampaign(yaml, "c.yaml", ReaderOf(files)).problems) {
+  for (const Problem& problem :
+       ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files)).problems) {
     text += ToString(problem) + "\n";
   }
   return text;

@@ -1,6 +1,7 @@
 #include "tests/unit/campaign/laboratory.h"
 
 #include "absl/strings/str_cat.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -21,7 +22,8 @@ ReadOutcome Read(const Laboratory& lab, CampaignIs is) {
       "    data: {file: d.csv, ", lab.data, "}\n    control: ", lab.control,
       "\n    observables: ", lab.observables, "\n",
       "noise: given\ninference: {method: sqmc, samples: 4}\nseed: 7\n");
-  return ReadCampaign(yaml, "c.yaml", ReaderOf({{"d.csv", lab.file}}), std::nullopt, is);
+  return ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf({{"d.csv", lab.file}}), std::nullopt,
+                      is);
 }
 
 std::string ProblemsIn(const ReadOutcome& outcome) {

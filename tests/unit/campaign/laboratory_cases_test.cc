@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/checks/experiment_summary.h"
 #include "server/campaign/file/campaign_file.h"
+#include "server/methods/registry.h"
 
 namespace calib::campaign {
 namespace {
@@ -72,7 +73,7 @@ const std::vector<LaboratoryCase>& LaboratoryCases() {
 ReadOutcome ReadCase(const fs::path& folder) {
   std::ifstream file(folder / "c.yaml");
   const std::string yaml{std::istreambuf_iterator<char>(file), {}};
-  return ReadCampaign(yaml, "c.yaml", DiskReader((folder / "c.yaml").string()));
+  return ReadCampaign(methods::All(), yaml, "c.yaml", DiskReader((folder / "c.yaml").string()));
 }
 
 std::optional<fs::path> Collection() {

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/checks/experiment_summary.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 #include "tests/unit/campaign/laboratory.h"
 
@@ -200,6 +201,7 @@ TEST(LaboratoryFiles, FormatKeysAreChecked) {
 // Four readings at 0, 1, 2, 3 %, and two runs that go on at other strains.
 ReadOutcome ReadRuns(const std::string& states, CampaignIs is = CampaignIs::kNew) {
   return ReadCampaign(
+      methods::All(),
       "name: a\nmodel:\n  precomputed:\n    parameters: p.csv\n    states: s.csv\n"
       "    state_units: {mean_stress: MPa}\n"
       "parameters: {stiff: {prior: uniform, min: 0, max: 200, unit: 1}}\n"

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/checks/experiment_summary.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 #include "tests/unit/campaign/laboratory.h"
 
@@ -25,7 +26,7 @@ ReadOutcome ReadFromDisk(const std::string& file, const std::string& experiment)
                    "spread: 0.3}, ",
                    "seed: 1}}\n", "    data:\n      file: $CALIB_DATA/", file, "\n", experiment,
                    "noise: given\ninference: {method: sqmc, samples: 4}\nseed: 7\n");
-  return ReadCampaign(yaml, "c.yaml", DiskReader("c.yaml"));
+  return ReadCampaign(methods::All(), yaml, "c.yaml", DiskReader("c.yaml"));
 }
 
 TEST(LaboratoryFiles, AreReadByKeysAloneOnTheMeasurements) {
@@ -124,6 +125,7 @@ TEST(LaboratoryFiles, ATableOfAnyQuantitiesIsReadWithRunsMadeElsewhereOnTheMeasu
     }
   }
   const auto outcome = ReadCampaign(
+      methods::All(),
       "name: a\nmodel: {precomputed: {parameters: p.csv, states: s.csv}}\n"
       "parameters: {k: {prior: uniform, min: 0, max: 10}}\n"
       "experiments:\n  - name: contact\n    data: {file: d.txt}\n    control: u\n"

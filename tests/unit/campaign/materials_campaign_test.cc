@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/str_replace.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -60,7 +61,8 @@ std::string With(const std::string& from, const std::string& to) {
 }
 
 TEST(MaterialsCampaign, ValuesArePartOfTheModelAndUsesOfTheExperiments) {
-  const ReadOutcome outcome = ReadCampaign(MaterialsYaml(), "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome =
+      ReadCampaign(methods::All(), MaterialsYaml(), "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   const Campaign& c = outcome.campaign;
   EXPECT_THAT(c.model.materials, ElementsAre("steel", "wood"));
@@ -92,7 +94,7 @@ TEST(MaterialsCampaign, PairsHaveValuesOfEffectsOfTheirOwn) {
         "  wood.young_modulus: default\n"
         "  wood-grains.viscous_damping.ratio: default\n"
         "  wood-wood.rolling_resistance.friction: {prior: uniform, min: 0, max: 0.4}"}});
-  const ReadOutcome outcome = ReadCampaign(text, "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), text, "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   const Campaign& c = outcome.campaign;
   EXPECT_DOUBLE_EQ(c.model.parameters.at("steel-grains.rolling_resistance.friction"), 0.02);
@@ -203,7 +205,8 @@ TEST(MaterialsCampaign, OfATableOrDerivedOneMaterialsMayHaveNoPart) {
 
 TEST(MaterialsCampaign, SamplesOfOnePackingHaveOneMixture) {
   const Campaign c =
-      ReadCampaign(absl::StrReplaceAll(
+      ReadCampaign(methods::All(),
+                   absl::StrReplaceAll(
                        MaterialsYaml(),
                        {{"    materials: {walls", "    realizations: 2\n    materials: {walls"}}) +
                        "seed: 40\n",

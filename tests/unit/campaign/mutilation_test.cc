@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -62,7 +63,7 @@ TEST(Mutilation, DamagedCampaignFilesNeverCrash) {
   for (std::uint32_t seed = 0; seed < 3000; ++seed) {
     Mutilator mutilator(seed);
     const ReadOutcome outcome =
-        ReadCampaign(mutilator.Damage(GoodYaml()), "c.yaml", ReaderOf(GoodFiles()));
+        ReadCampaign(methods::All(), mutilator.Damage(GoodYaml()), "c.yaml", ReaderOf(GoodFiles()));
     ExpectOneLineEach(outcome);
     good += outcome.problems.empty() ? 1 : 0;
   }
@@ -74,7 +75,7 @@ TEST(Mutilation, DamagedDataAndPackingsNeverCrash) {
     Mutilator mutilator(seed);
     auto files = GoodFiles();
     for (auto& [path, content] : files) content = mutilator.Damage(content);
-    ExpectOneLineEach(ReadCampaign(GoodYaml(), "c.yaml", ReaderOf(files)));
+    ExpectOneLineEach(ReadCampaign(methods::All(), GoodYaml(), "c.yaml", ReaderOf(files)));
   }
 }
 
@@ -86,15 +87,16 @@ TEST(Mutilation, SmallTextsThatExplode) {
     for (int i = 0; i < 9; ++i) laughs += (i == 0 ? "*" : ", *") + before;
     laughs += "]\n";
   }
-  EXPECT_FALSE(ReadCampaign(laughs, "c.yaml", ReaderOf({})).problems.empty());
-  EXPECT_FALSE(ReadCampaign("a: &a [*a]", "c.yaml", ReaderOf({})).problems.empty());
-  EXPECT_FALSE(ReadCampaign(std::string(100000, '['), "c.yaml", ReaderOf({})).problems.empty());
-  EXPECT_FALSE(ReadCampaign("", "c.yaml", ReaderOf({})).problems.empty());
+  EXPECT_FALSE(ReadCampaign(methods::All(), laughs, "c.yaml", ReaderOf({})).problems.empty());
+  EXPECT_FALSE(ReadCampaign(methods::All(), "a: &a [*a]", "c.yaml", ReaderOf({})).problems.empty());
+  EXPECT_FALSE(ReadCampaign(methods::All(), std::string(100000, '['), "c.yaml", ReaderOf({}))
+                   .problems.empty());
+  EXPECT_FALSE(ReadCampaign(methods::All(), "", "c.yaml", ReaderOf({})).problems.empty());
 }
 
 TEST(Mutilation, WhatIsNestedTooDeeplyIsSaidAndARuledCommentIsNot) {
   const auto problem = [](const std::string& text) {
-    const auto problems = ReadCampaign(text, "c.yaml", ReaderOf({})).problems;
+    const auto problems = ReadCampaign(methods::All(), text, "c.yaml", ReaderOf({})).problems;
     return problems.empty() ? "" : problems.front().message;
   };
   const std::string deep = "is nested too deeply or too large for a campaign file";
@@ -104,7 +106,8 @@ TEST(Mutilation, WhatIsNestedTooDeeplyIsSaidAndARuledCommentIsNot) {
   EXPECT_EQ(problem(std::string(60, '{') + "\n"), deep);
   EXPECT_EQ(problem(std::string(300'000, '\n')), deep);
   const std::string ruled = "# " + std::string(100, '-') + " priors " + lists + "\n";
-  EXPECT_TRUE(ReadCampaign(ruled + GoodYaml(), "c.yaml", ReaderOf(GoodFiles())).problems.empty());
+  EXPECT_TRUE(ReadCampaign(methods::All(), ruled + GoodYaml(), "c.yaml", ReaderOf(GoodFiles()))
+                  .problems.empty());
 }
 
 }  // namespace

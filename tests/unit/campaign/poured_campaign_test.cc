@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "server/campaign/model/specimen_notes.h"
+#include "server/methods/registry.h"
 #include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
 
@@ -42,7 +43,8 @@ inference: {samples: 10}
 }
 
 TEST(PouredCampaign, TakesSizesOnlyAndReadingsInAnyOrder) {
-  const ReadOutcome outcome = ReadCampaign(PouredYaml(), "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome =
+      ReadCampaign(methods::All(), PouredYaml(), "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
   const Experiment& experiment = outcome.campaign.experiments[0];
@@ -62,7 +64,7 @@ TEST(PouredCampaign, RealizationsOfAFilePourItsGrainsAnew) {
   const std::string yaml = absl::StrReplaceAll(
       PouredYaml(), {{"{generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}\n",
                       "{file: packing.txt}\n    realizations: 2\n"}});
-  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
   const auto& specimens = outcome.campaign.experiments[0].specimens;
@@ -77,7 +79,7 @@ TEST(PouredCampaign, TakesAGradingCurve) {
   const std::string yaml = absl::StrReplaceAll(
       PouredYaml(),
       {{"radii: {mean: 2 mm, spread: 0.1}", "diameters: {median: 4 mm, log_sd: 0.2}"}});
-  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
   const auto& recipe =
@@ -137,8 +139,8 @@ TEST(PouredCampaign, AMeshIsReadInItsUnit) {
   auto files = Files();
   files["silo.stl"] =
       calib::testing::TextStl(calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300}));
-  const ReadOutcome outcome =
-      ReadCampaign(WithMesh("{silo: {file: silo.stl, unit: mm}}"), "c.yaml", ReaderOf(files));
+  const ReadOutcome outcome = ReadCampaign(
+      methods::All(), WithMesh("{silo: {file: silo.stl, unit: mm}}"), "c.yaml", ReaderOf(files));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
   const MeshFile& mesh = outcome.campaign.experiments[0].meshes.at("silo");

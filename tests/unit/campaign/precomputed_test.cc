@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/campaign/file/read_precomputed.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -53,7 +54,8 @@ inference: {method: sqmc}
 }
 
 TEST(Precomputed, ReadsBothTablesInSi) {
-  const ReadOutcome outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(Tables()));
+  const ReadOutcome outcome =
+      ReadCampaign(methods::All(), BeadsYaml(), "c.yaml", ReaderOf(Tables()));
   ASSERT_EQ(ProblemsOf(BeadsYaml(), Tables()), "");
   const Campaign& c = outcome.campaign;
   ASSERT_TRUE(c.precomputed.has_value());
@@ -72,7 +74,7 @@ TEST(Precomputed, ReadsBothTablesInSi) {
 TEST(Precomputed, CountsStepsFromOneToo) {
   auto files = Tables();
   files["sta.csv"] = "sample,step,p_MPa,porosity\n0,1,1.1,0.4\n0,2,2.1,0.39\n0,3,1.4,0.393\n";
-  const ReadOutcome outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(files));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), BeadsYaml(), "c.yaml", ReaderOf(files));
   ASSERT_THAT(outcome.problems, IsEmpty());
   EXPECT_DOUBLE_EQ(outcome.campaign.precomputed->values[0][0][0], 1.1e6);
 }
@@ -122,11 +124,12 @@ TEST(Precomputed, OneSetOfParametersIsNoSample) {
 
 TEST(Precomputed, RepeatedSetsAreWarnedOf) {
   const auto repeated = [](const Warning& w) { return w.kind == WarningKind::kRepeated; };
-  const auto plain = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(Tables())).warnings;
+  const auto plain =
+      ReadCampaign(methods::All(), BeadsYaml(), "c.yaml", ReaderOf(Tables())).warnings;
   EXPECT_TRUE(std::none_of(plain.begin(), plain.end(), repeated));
   auto files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,100,8000\n2,120,5000\n3,100,8000\n";
-  const auto outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(files));
+  const auto outcome = ReadCampaign(methods::All(), BeadsYaml(), "c.yaml", ReaderOf(files));
   ASSERT_THAT(outcome.problems, IsEmpty());
   const auto found = std::find_if(outcome.warnings.begin(), outcome.warnings.end(), repeated);
   ASSERT_NE(found, outcome.warnings.end());
@@ -187,7 +190,8 @@ std::string WithText(std::string text, const std::string& from, const std::strin
 
 TEST(Precomputed, RowsThatHaveEffectsDoNotCalibrate) {
   ASSERT_EQ(ProblemsOf(EffectsYaml(), TablesWithEffects()), "");
-  const Campaign c = ReadCampaign(EffectsYaml(), "c.yaml", ReaderOf(TablesWithEffects())).campaign;
+  const Campaign c =
+      ReadCampaign(methods::All(), EffectsYaml(), "c.yaml", ReaderOf(TablesWithEffects())).campaign;
   EXPECT_EQ(c.samples, 2);
   EXPECT_EQ(c.precomputed->parameters.col(0), Eigen::Vector2d(1e11, 1.2e11));
   EXPECT_DOUBLE_EQ(c.precomputed->values[0][1][0], 1.5e6);

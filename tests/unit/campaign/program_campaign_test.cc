@@ -10,6 +10,7 @@
 #include "absl/strings/str_replace.h"
 #include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -62,7 +63,7 @@ inference: {samples: 10}
 
 ReadOutcome ReadProgramYaml(const std::string& yaml,
                             const std::map<std::string, std::string>& files = ProgramFiles()) {
-  return ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  return ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files));
 }
 
 std::string SpoiledProgram(const std::string& from, const std::string& to) {
@@ -268,7 +269,7 @@ TEST(ProgramCampaign, SettingsThatShouldNotMatterAreToldAtTheirNull) {
   };
   EXPECT_EQ(told(outcome.campaign, {2e3, 0.5}), 0.8);
   Campaign design = outcome.campaign;
-  design.method = Method::kDesign;
+  design.method = methods::All().Find("design");
   design.parameters.push_back({.name = "numerics.time_step_factor", .unit = "1", .prior = {}});
   EXPECT_EQ(told(design, {2e3, 0.5, 1}), 1);
   EXPECT_EQ(told(design, {2e3, 0.5, 0.8}), 0.8);

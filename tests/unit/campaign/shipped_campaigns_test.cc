@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "server/campaign/file/campaign_file.h"
+#include "server/methods/registry.h"
 
 namespace calib::campaign {
 namespace {
@@ -42,8 +43,8 @@ bool NeedsMeasurements(const fs::path& campaign) {
 }
 
 void ExpectNoWarning(const fs::path& campaign) {
-  const auto outcome =
-      ReadCampaign(TextOf(campaign), campaign.filename(), DiskReader(campaign.string()));
+  const auto outcome = ReadCampaign(methods::All(), TextOf(campaign), campaign.filename(),
+                                    DiskReader(campaign.string()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << campaign << ToString(problem);
   for (const Warning& warning : outcome.warnings) ADD_FAILURE() << campaign << Sentence(warning);
 }

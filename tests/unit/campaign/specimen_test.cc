@@ -13,6 +13,7 @@
 #include "dem/particles/packing.h"
 #include "server/campaign/model/replicates.h"
 #include "server/campaign/model/specimen_notes.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -60,7 +61,7 @@ std::string WithRealizations(const std::string& packing, int count) {
 }
 
 ReadOutcome Read(const std::string& yaml, const std::map<std::string, std::string>& files) {
-  ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   return outcome;
 }
@@ -118,14 +119,14 @@ TEST(Realizations, BeyondSeveralFilesTakeThemInTurn) {
 TEST(Realizations, WhoLeavesTheirScatterOutSaysSo) {
   Campaign c = Read(WithRealizations("file: packing.txt", 2), GoodFiles()).campaign;
   c.filter.noise = inference::NoiseMode::kGiven;
-  c.method = Method::kIterativeBayesianFilter;
+  c.method = methods::All().Find("iterative_bayesian_filter");
   EXPECT_EQ(ScatterLeftOut(c), "");
   c.filter.noise = inference::NoiseMode::kInferred;
   EXPECT_THAT(ScatterLeftOut(c), HasSubstr("With noise inferred what runs on different packings"));
-  for (const Method method : {Method::kTmcmc, Method::kSurrogateMsrs}) {
-    c.method = method;
+  for (const char* method : {"tmcmc", "surrogate_msrs"}) {
+    c.method = methods::All().Find(method);
     EXPECT_THAT(ScatterLeftOut(c),
-                HasSubstr(std::string(ToString(method)) + " compares runs by the stated errors"));
+                HasSubstr(std::string(method) + " compares runs by the stated errors"));
     EXPECT_THAT(SpecimenNotes(c), Contains(ScatterLeftOut(c)));
     Campaign one = c;
     for (Experiment& e : one.experiments) e.specimens.resize(1);
@@ -156,15 +157,15 @@ TEST(Replicates, AreAsManyAsThereArePackingsOrEightTwinsOnOne) {
     EXPECT_EQ(ReplicatesOf(c), said);
   }
   c.replicates.reset();
-  for (const Method method : {Method::kTmcmc, Method::kSurrogateMsrs, Method::kSqmc}) {
-    c.method = method;
-    EXPECT_EQ(ReplicatesOf(c), 8) << ToString(method);
+  for (const char* method : {"tmcmc", "surrogate_msrs", "sqmc"}) {
+    c.method = methods::All().Find(method);
+    EXPECT_EQ(ReplicatesOf(c), 8) << method;
   }
-  for (const Method method : {Method::kTable, Method::kDesign}) {
-    c.method = method;
-    EXPECT_EQ(ReplicatesOf(c), 0) << ToString(method);
+  for (const char* method : {"table", "design"}) {
+    c.method = methods::All().Find(method);
+    EXPECT_EQ(ReplicatesOf(c), 0) << method;
   }
-  c.method = Method::kIterativeBayesianFilter;
+  c.method = methods::All().Find("iterative_bayesian_filter");
   c.filter.noise = inference::NoiseMode::kEssTarget;
   EXPECT_EQ(ReplicatesOf(c), 0);
   Campaign four = Read(WithRealizations("file: packing.txt", 4), GoodFiles()).campaign;
@@ -318,7 +319,7 @@ const std::string kGuidesReadings = "$CALIB_DATA/toyoura_triaxial/experiment_0.2
 
 // The note on its four realizations; every problem of the file fails the test.
 std::string NoteOnTheGuides(const FileReader& reader) {
-  const ReadOutcome outcome = ReadCampaign(kCampaignOfTheGuide, "c.yaml", reader);
+  const ReadOutcome outcome = ReadCampaign(methods::All(), kCampaignOfTheGuide, "c.yaml", reader);
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   EXPECT_THAT(outcome.campaign.experiments, SizeIs(1));
   if (::testing::Test::HasFailure()) return "";

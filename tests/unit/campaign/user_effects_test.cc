@@ -4,6 +4,7 @@
 
 #include "server/campaign/file/derive.h"
 #include "server/campaign/file/shared/formula_units.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -40,7 +41,8 @@ std::string Changed(const std::string& from, const std::string& to) {
 }
 
 TEST(UserEffects, AreReadWithUnitsNullsAndSteps) {
-  const ReadOutcome read = ReadCampaign(With(kDamping), "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome read =
+      ReadCampaign(methods::All(), With(kDamping), "c.yaml", ReaderOf(GoodFiles()));
   EXPECT_EQ(ProblemsOf(With(kDamping)), "");
   ASSERT_EQ(read.campaign.model.user_effects.size(), 1U);
   const dem::UserEffect& effect = read.campaign.model.user_effects[0];
@@ -64,7 +66,7 @@ TEST(UserEffects, WhatHasNoDefaultIsHeldAtTheMedianOfItsPrior) {
   const std::string yaml =
       Changed("default: 1 mm", "prior: {prior: log_uniform, min: 0.1 mm, max: 10 mm}");
   EXPECT_EQ(ProblemsOf(yaml), "");
-  const ReadOutcome read = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome read = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()));
   const dem::EffectInfo& effect = read.campaign.model.user_effects.at(0).info;
   ASSERT_EQ(effect.rays.size(), 1U);
   ASSERT_EQ(effect.rays[0].held.size(), 1U);
@@ -87,7 +89,7 @@ TEST(UserEffects, JoinTheModelLikeAnyOther) {
 TEST(UserEffects, AStrengthThatGoesBothWaysIsTwoSided) {
   const std::string yaml = Changed("prior: log_uniform, min: 0.01, max: 10}, steps: [0.1, 1 N s/m]",
                                    "prior: uniform, min: -1, max: 1}");
-  const ReadOutcome read = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome read = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()));
   EXPECT_EQ(ProblemsOf(yaml), "");
   EXPECT_TRUE(read.campaign.model.user_effects.at(0).info.two_sided);
   const auto& steps = read.campaign.model.user_effects[0].info.rays.at(0).steps;
@@ -96,7 +98,7 @@ TEST(UserEffects, AStrengthThatGoesBothWaysIsTwoSided) {
 }
 
 TEST(UserEffects, ReadingsAreAddedToAndScaled) {
-  const ReadOutcome read = ReadCampaign(With(R"(
+  const ReadOutcome read = ReadCampaign(methods::All(), With(R"(
     penetration:
       adds: volumetric_strain
       formula: m * max(0, mean_stress - p0) / p0
@@ -118,8 +120,8 @@ TEST(UserEffects, ReadingsAreAddedToAndScaled) {
 TEST(UserEffects, StepsOutsideThePriorAreRefusedOfNewCampaignsOnly) {
   const std::string yaml = Changed("steps: [0.1, 1 N s/m]", "steps: [0.1, 20 N s/m]");
   EXPECT_THAT(ProblemsOf(yaml), HasSubstr("steps: 20 is outside its prior, 0.01 to 10"));
-  const ReadOutcome stored =
-      ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()), std::nullopt, CampaignIs::kStored);
+  const ReadOutcome stored = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()),
+                                          std::nullopt, CampaignIs::kStored);
   for (const Problem& problem : stored.problems) ADD_FAILURE() << ToString(problem);
   EXPECT_THAT(stored.campaign.model.user_effects.at(0).info.rays.at(0).steps, ElementsAre(0.1, 20));
 }
@@ -127,15 +129,16 @@ TEST(UserEffects, StepsOutsideThePriorAreRefusedOfNewCampaignsOnly) {
 // extend, diagnose and improve write campaigns that follow from this one.
 TEST(UserEffects, SurviveTheTextOfADerivedCampaign) {
   const auto derived =
-      Derive(With(kDamping),
+      Derive(methods::All(), With(kDamping),
              {.name = "joined",
               .lineage = {.parent = "c1", .purpose = "extension"},
               .effects = {"my_damping"},
               .parameters = {{"my_damping.c", {.kind = "log_uniform", .min = 0.01, .max = 10}}}});
   ASSERT_TRUE(derived.ok()) << derived.status();
   EXPECT_EQ(ProblemsOf(*derived), "") << *derived;
-  const ReadOutcome read = ReadCampaign(*derived, "c.yaml", ReaderOf(GoodFiles()));
-  const ReadOutcome parent = ReadCampaign(With(kDamping), "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome read = ReadCampaign(methods::All(), *derived, "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome parent =
+      ReadCampaign(methods::All(), With(kDamping), "c.yaml", ReaderOf(GoodFiles()));
   EXPECT_THAT(read.campaign.model.effects, ElementsAre("rolling_resistance", "my_damping"));
   const dem::UserEffect& effect = read.campaign.model.user_effects.at(0);
   EXPECT_EQ(effect.formula, parent.campaign.model.user_effects.at(0).formula);

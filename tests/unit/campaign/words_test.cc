@@ -23,7 +23,6 @@ void ExpectOneWordEach(const WordTable<Enum, N>& table) {
 }
 
 TEST(Words, EachIsItsOwnInverse) {
-  ExpectOneWordEach(kMethodWords);
   ExpectOneWordEach(kShearUnloadingWords);
   ExpectOneWordEach(kRoleWords);
   ExpectOneWordEach(kCampaignStateWords);

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/methods/registry.h"
+
 namespace calib::diagnosis {
 namespace {
 
@@ -23,11 +25,11 @@ void Calibrate(const char* name, inference::PriorKind kind, double min, double m
 }
 
 // Two fitted tests, one held out, two parameters.
-report::CampaignView Parent(campaign::Method method) {
+report::CampaignView Parent(std::string_view method) {
   report::CampaignView view;
   view.campaign.model.contact = "hertz_mindlin";
   view.campaign.model.density = 2500;
-  view.campaign.method = method;
+  view.campaign.method = methods::All().Find(method);
   view.campaign.samples = 96;
   view.campaign.max_iterations = 4;
   Calibrate("young_modulus", inference::PriorKind::kLogUniform, 1e8, 1e10, view);
@@ -46,10 +48,10 @@ const NamedModel& Plastic() {
 }
 
 TEST(ExtendedCalibration, AFilterTakesFiveSamplesForEachParameterAtATime) {
-  for (const auto method : {campaign::Method::kSqmc, campaign::Method::kIterativeBayesianFilter}) {
+  for (const auto method : {"sqmc", "iterative_bayesian_filter"}) {
     const auto plan = PlanExtended(Parent(method), Plastic());
     ASSERT_TRUE(plan.ok()) << plan.status();
-    EXPECT_EQ(plan->method, campaign::Method::kIterativeBayesianFilter);
+    EXPECT_EQ(plan->method, "iterative_bayesian_filter");
     EXPECT_EQ(plan->samples, 15);
     EXPECT_GE(plan->iterations, 2) << "of one nobody knows whether it stands still";
     EXPECT_EQ(plan->model_evaluations, std::nullopt);
@@ -58,15 +60,15 @@ TEST(ExtendedCalibration, AFilterTakesFiveSamplesForEachParameterAtATime) {
 }
 
 TEST(ExtendedCalibration, MoreRunsAreMoreIterationsOfTheSame) {
-  const auto once = PlanExtended(Parent(campaign::Method::kSqmc), Plastic());
-  const auto twice = PlanExtended(Parent(campaign::Method::kSqmc), Plastic(), {.times = 2});
+  const auto once = PlanExtended(Parent("sqmc"), Plastic());
+  const auto twice = PlanExtended(Parent("sqmc"), Plastic(), {.times = 2});
   ASSERT_TRUE(once.ok() && twice.ok());
   EXPECT_EQ(*twice->iterations, 2 * *once->iterations);
   EXPECT_EQ(twice->samples, once->samples) << "or the first would not be found again";
 }
 
 TEST(ExtendedCalibration, OtherMethodsAreThoseOfTheParent) {
-  const auto plan = PlanExtended(Parent(campaign::Method::kTmcmc), Plastic());
+  const auto plan = PlanExtended(Parent("tmcmc"), Plastic());
   ASSERT_TRUE(plan.ok()) << plan.status();
   EXPECT_EQ(plan->method, std::nullopt);
   EXPECT_EQ(plan->samples, std::nullopt);
@@ -74,7 +76,7 @@ TEST(ExtendedCalibration, OtherMethodsAreThoseOfTheParent) {
 }
 
 TEST(ExtendedCalibration, ABudgetThatAllowsNoIterationIsSaid) {
-  const report::CampaignView parent = Parent(campaign::Method::kSqmc);
+  const report::CampaignView parent = Parent("sqmc");
   EXPECT_EQ(PlanExtended(parent, Plastic(), {.budget = 30})->model_evaluations, 30);
   const auto less = PlanExtended(parent, Plastic(), {.budget = 29}).status();
   EXPECT_EQ(less.code(), absl::StatusCode::kResourceExhausted);
@@ -85,7 +87,7 @@ TEST(ExtendedCalibration, ABudgetThatAllowsNoIterationIsSaid) {
 
 // Parameters of the parent, two effects of a race and one of the numerics.
 report::CampaignView Design() {
-  report::CampaignView view = Parent(campaign::Method::kDesign);
+  report::CampaignView view = Parent("design");
   view.campaign.race = {"contact_plasticity", "pressure_dependent_friction"};
   Calibrate("contact_plasticity.stiffness_ratio", inference::PriorKind::kLogUniform, 1, 11, view);
   Calibrate("pressure_dependent_friction.exponent", inference::PriorKind::kUniform, -0.6, 0.6,
@@ -104,7 +106,7 @@ void AddRun(const std::vector<double>& values, const char* status, report::Campa
 }
 
 TEST(ExtendedCalibration, RunsOfTheModelAreTakenFromTheDesign) {
-  const report::CampaignView parent = Parent(campaign::Method::kSqmc);
+  const report::CampaignView parent = Parent("sqmc");
   report::CampaignView design = Design();
   AddRun({1e9, 0.4, 2.5, 0, 1}, "finished", design);    // the model
   AddRun({1e9, 0.4, 1, 0, 1}, "finished", design);      // the base
@@ -130,7 +132,7 @@ TEST(ExtendedCalibration, RunsOfTheModelAreTakenFromTheDesign) {
 
 // They keep what parameters do together, which a proposal about the mean does not.
 TEST(ExtendedCalibration, TheFirstRunsAreAtDrawsOfThePosteriorTwiceAsFarFromItsMean) {
-  const report::CampaignView parent = Parent(campaign::Method::kSqmc);
+  const report::CampaignView parent = Parent("sqmc");
   NamedModel model = Plastic();
   model.posterior["young_modulus"] = {.center = 1e9, .sd = 1e8};
   model.posterior["friction_coefficient"] = {.center = 0.5, .sd = 0.1};

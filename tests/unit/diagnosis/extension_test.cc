@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include "server/methods/registry.h"
+
 namespace calib::diagnosis {
 namespace {
 
@@ -57,6 +59,7 @@ TEST(Extension, OnlySpheresCrush) {
 // Strengths are in units of the forces that the test's own contacts carry.
 TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
   report::CampaignView view;
+  view.campaign.method = methods::All().standard();
   view.campaign.model.contact = "hertz_mindlin";
   view.campaign.model.density = 2500;
   view.campaign.model.parameters["young_modulus"] = 1e7;
@@ -99,6 +102,7 @@ TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
 TEST(Extension, PriorsOfStrengthsAreWideEnoughForEveryModulusThatItMayMoveTo) {
   report::CampaignView view;
   view.campaign.name = "bent";
+  view.campaign.method = methods::All().standard();
   view.campaign.model.contact = "hertz_mindlin";
   view.campaign.parameters.push_back(
       {.name = "young_modulus",

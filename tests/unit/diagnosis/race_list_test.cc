@@ -11,6 +11,7 @@
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/design_rows.h"
+#include "server/methods/registry.h"
 #include "tests/support/race_toy.h"
 #include "tests/support/sixty_four_grains.h"
 
@@ -125,7 +126,7 @@ TEST(RaceList, ADesignAdmitsEveryRowOfItsRace) {
 // What is submitted: the text, read as the server reads it.
 TEST(RaceList, TheTextOfADesignIsReadBackAsItsCampaign) {
   const auto read = [](const std::string& text) {
-    return campaign::ReadCampaign(text, "c.yaml", [](const std::string&) {
+    return campaign::ReadCampaign(methods::All(), text, "c.yaml", [](const std::string&) {
       return std::string(
           "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0.0008\n0.005,0.8,0.0012\n"
           "0.01,1.0,0.001\n");
@@ -140,7 +141,7 @@ TEST(RaceList, TheTextOfADesignIsReadBackAsItsCampaign) {
   view.status.set_campaign("c1");
   const Race race = RaceFor(view);
   ASSERT_GT(race.effects.size(), 10U);
-  const auto text = campaign::Derive(base, DesignOf(view, race));
+  const auto text = campaign::Derive(methods::All(), base, DesignOf(view, race));
   ASSERT_TRUE(text.ok()) << text.status();
   const campaign::ReadOutcome outcome = read(*text);
   std::string problems;
@@ -148,7 +149,7 @@ TEST(RaceList, TheTextOfADesignIsReadBackAsItsCampaign) {
   ASSERT_EQ(problems, "") << *text;
   const campaign::Campaign expected = CampaignOfDesign(view.campaign, race);
   const campaign::Campaign& design = outcome.campaign;
-  EXPECT_EQ(design.method, campaign::Method::kDesign);
+  EXPECT_EQ(design.method->name(), "design");
   EXPECT_EQ(design.race, expected.race);
   ASSERT_EQ(design.parameters.size(), expected.parameters.size());
   for (const campaign::CalibratedParameter& own : expected.parameters) {

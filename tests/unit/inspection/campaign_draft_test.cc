@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/file/campaign_file.h"
+#include "server/methods/registry.h"
 #include "tests/unit/inspection/tables.h"
 
 namespace calib::inspection {
@@ -29,7 +30,7 @@ std::string KnownText() {
 
 campaign::ReadOutcome Read(const std::string& yaml, const std::string& table) {
   return campaign::ReadCampaign(
-      yaml, "out.yaml",
+      methods::All(), yaml, "out.yaml",
       [&table](const std::string&) -> absl::StatusOr<std::string> { return table; });
 }
 

@@ -11,6 +11,7 @@
 #include "server/campaign/file/derive.h"
 #include "server/campaign/model/race.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 #include "tests/support/small_campaign.h"
 
 namespace calib::messages {
@@ -56,17 +57,18 @@ class DesignDigest : public ::testing::Test {
  protected:
   campaign::Campaign Read(const std::string& yaml) const {
     const auto files = small_.files;
-    campaign::ReadOutcome outcome = campaign::ReadCampaign(
-        yaml, "c.yaml", [&files](const std::string& path) -> absl::StatusOr<std::string> {
-          return files.at(path);
-        });
+    campaign::ReadOutcome outcome =
+        campaign::ReadCampaign(methods::All(), yaml, "c.yaml",
+                               [&files](const std::string& path) -> absl::StatusOr<std::string> {
+                                 return files.at(path);
+                               });
     EXPECT_TRUE(outcome.problems.empty()) << campaign::ToString(outcome.problems.front()) << "\n"
                                           << yaml;
     return std::move(outcome.campaign);
   }
 
   campaign::Campaign Derived(const campaign::Derivation& derivation) const {
-    const auto text = campaign::Derive(small_.yaml, derivation);
+    const auto text = campaign::Derive(methods::All(), small_.yaml, derivation);
     EXPECT_TRUE(text.ok()) << text.status();
     return Read(*text);
   }

@@ -18,6 +18,7 @@
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/campaign/model/run_settings.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 
 namespace calib::messages {
 namespace {
@@ -79,7 +80,7 @@ campaign::ReadOutcome ReadFile(const dem::TestInfo& test, const std::string& yam
     return absl::NotFoundError("no such file");
   };
   // Accepted before: what is useless with these values is not asked.
-  return campaign::ReadCampaign(yaml, "c.yaml", reader, std::nullopt,
+  return campaign::ReadCampaign(methods::All(), yaml, "c.yaml", reader, std::nullopt,
                                 campaign::CampaignIs::kStored);
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "server/methods/registry.h"
 namespace calib::report::testing {
 namespace {
 
@@ -101,6 +102,7 @@ CampaignView ExampleView(const std::string& name) {
   view.campaign.model.contact = "hertz_mindlin";
   view.campaign.model.effects = {"rolling_resistance"};
   view.campaign.model.parameters = {{"poisson_ratio", 0.2}};
+  view.campaign.method = methods::All().standard();
   view.campaign.samples = 60;
   view.campaign.max_iterations = 4;
   view.status.set_max_iterations(4);

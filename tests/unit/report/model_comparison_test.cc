@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "server/methods/registry.h"
 #include "server/report/documents/json_documents.h"
 #include "tests/unit/report/example_view.h"
 
@@ -69,7 +70,7 @@ TEST(ModelComparison, ErrorsAndHeldOutDataMayDiffer) {
 
 TEST(ModelComparison, AnotherMethodIsSaidToBeOne) {
   RivalModel other = Rival("c2", 1);
-  other.campaign.method = campaign::Method::kTmcmc;
+  other.campaign.method = methods::All().Find("tmcmc");
   ASSERT_NE(other.campaign.method, Rival("c1", 0).campaign.method);
   const auto comparison = CompareModels({Rival("c1", 0), other});
   ASSERT_TRUE(comparison.ok()) << comparison.status();

@@ -10,6 +10,7 @@ v1::CampaignStatus In(const std::string& state, const std::string& method = "tmc
   status.set_campaign("c1");
   status.set_state(state);
   status.set_method(method);
+  status.set_infers_nothing(std::string(method) == "design");
   return status;
 }
 

@@ -1,4 +1,4 @@
-#include "server/scheduler/answer.h"
+#include "server/planning/answer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "server/service/queries.h"
 #include "tests/support/square_campaign.h"
 #include "tests/unit/scheduler/simulated_service.h"
@@ -30,7 +30,7 @@ v1::Posterior RunCampaign(SimulatedService& service, int samples, double noise) 
   service.RunToEnd(1, true);
   v1::Posterior last;
   for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
+    if (iteration.posterior.has_value()) last = *planning::PosteriorFromJson(*iteration.posterior);
   }
   return last;
 }
@@ -112,7 +112,7 @@ TEST(Answer, WithTooFewRunsToEmulateNoIntervalIsGiven) {
 // The first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7, or as 2.6 whatever b
 // is: that one is missed by 16 sd, so that a is looked for by errors of 0.57 instead of 0.1.
 TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
-  const auto definition = MakeDefinition(testing::SquareCampaign());
+  const auto definition = planning::MakeDefinition(testing::SquareCampaign());
   inference::Iteration iteration;
   iteration.parameters.resize(30, 2);
   for (Eigen::Index i = 0; i < 30; ++i) {  // a lattice of golden ratios
@@ -120,20 +120,21 @@ TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
     iteration.parameters(i, 1) = std::fmod(0.5 + 0.569840291 * static_cast<double>(i), 1);
   }
   iteration.predictions = iteration.parameters.rowwise() + Eigen::RowVector2d(0.7, 0.3);
-  const auto near = FindAnswer(*definition, {&iteration, 1});
+  const auto near = planning::FindAnswer(*definition, {&iteration, 1});
   ASSERT_TRUE(near.ok() && near->emulated.has_value()) << near.status();
-  const SearchDraws by_own = DrawsToGoOnFrom(*definition, {&iteration, 1}, *near);
+  const planning::SearchDraws by_own =
+      planning::DrawsToGoOnFrom(*definition, {&iteration, 1}, *near);
   EXPECT_EQ(by_own.draws, near->emulated->draws);
   EXPECT_EQ(by_own.closest.rows(), 0);
 
   iteration.predictions.col(1).setConstant(2.6);
-  const auto far = FindAnswer(*definition, {&iteration, 1});
+  const auto far = planning::FindAnswer(*definition, {&iteration, 1});
   ASSERT_TRUE(far.ok() && far->emulated.has_value()) << far.status();
   const auto spread = [](const Eigen::MatrixXd& draws) {
     return std::sqrt((draws.col(0).array() - draws.col(0).mean()).square().mean());
   };
   EXPECT_LT(spread(far->emulated->draws), 0.15);
-  const SearchDraws wider = DrawsToGoOnFrom(*definition, {&iteration, 1}, *far);
+  const planning::SearchDraws wider = planning::DrawsToGoOnFrom(*definition, {&iteration, 1}, *far);
   EXPECT_GT(spread(wider.draws), 0.2);
   ASSERT_EQ(wider.closest.rows(), wider.draws.rows() / 10);
   EXPECT_LT((wider.closest.col(0).array() - 0.3).abs().maxCoeff(), 0.1) << "the best a";
@@ -145,7 +146,7 @@ TEST(Answer, TheBestMisfitOfACampaignIsThatOfAllItsIterations) {
   std::vector<double> misfits;
   for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
     if (iteration.posterior.has_value()) {
-      misfits.push_back(PosteriorFromJson(*iteration.posterior)->best_misfit());
+      misfits.push_back(planning::PosteriorFromJson(*iteration.posterior)->best_misfit());
     }
   }
   ASSERT_EQ(misfits.size(), 2U);

@@ -1,4 +1,4 @@
-#include "server/scheduler/early_stopping.h"
+#include "server/planning/early_stopping.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,9 @@
 #include <limits>
 #include <map>
 
-#include "server/scheduler/history.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/methods/registry.h"
+#include "server/planning/history.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -77,8 +78,9 @@ TEST(EarlyStopping, WhatStoppedRunsCameToReachesTheEmulator) {
   service.Submit(Campaign(kStopping, 0.02));
   service.RunToEnd(1, true);
   store::Reader reader = service.Read();
-  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
-  const History history = *LoadHistory(*definition, 1, reader);
+  const auto definition =
+      *planning::LoadDefinition(methods::All(), reader, Value(reader.Campaign(1)).submitted);
+  const planning::History history = *planning::LoadHistory(*definition, 1, reader);
   int stopped = 0;
   for (const inference::Iteration& iteration : history.iterations) {
     ASSERT_EQ(iteration.stopped.rows(), iteration.predictions.rows());
@@ -94,8 +96,8 @@ TEST(EarlyStopping, WhatStoppedRunsCameToReachesTheEmulator) {
   EXPECT_EQ(stopped, LastPosterior(service).stopped_early());
 }
 
-Eigen::VectorXd GuidingWeights(const Definition& definition, const History& history,
-                               double exponent) {
+Eigen::VectorXd GuidingWeights(const planning::Definition& definition,
+                               const planning::History& history, double exponent) {
   const Eigen::VectorXd importance =
       inference::LogImportance(definition.priors, history.iterations);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(importance.size());
@@ -121,16 +123,17 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
   full.RunToEnd(1, true);
   store::Reader reader = full.Read();
   campaign::Campaign allowed =
-      (*LoadDefinition(reader, Value(reader.Campaign(1)).submitted))->campaign;
+      (*planning::LoadDefinition(methods::All(), reader, Value(reader.Campaign(1)).submitted))
+          ->campaign;
   allowed.early_stopping.emplace().discard_at_most = 0.1;
-  const auto definition = MakeDefinition(std::move(allowed));
-  const History complete = *LoadHistory(*definition, 1, reader);
-  History before = complete;
+  const auto definition = planning::MakeDefinition(std::move(allowed));
+  const planning::History complete = *planning::LoadHistory(*definition, 1, reader);
+  planning::History before = complete;
   const inference::Iteration last = complete.iterations.back();
   before.iterations.pop_back();
-  const auto thresholds = *StopThresholds(*definition, before, last);
+  const auto thresholds = *planning::StopThresholds(*definition, before, last);
 
-  History stopped = complete;
+  planning::History stopped = complete;
   stopped.stopped_keys.clear();
   const Eigen::Index readings = last.predictions.cols();
   int saved = 0;
@@ -141,7 +144,8 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
     Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(readings, std::nan(""));
     for (Eigen::Index t = 0; t + 1 < readings; ++t) {
       seen[t] = run[t];
-      if (BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+      if (planning::BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)])
+        continue;
       stopped.iterations.back().predictions.row(i).setConstant(std::nan(""));
       stopped.stopped.back().row(i) = seen;
       const auto first = static_cast<int>((stopped.iterations.size() - 1) * 40);
@@ -151,7 +155,7 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
     }
   }
   ASSERT_GT(saved, 0);
-  const auto loss = *StatedLoss(*definition, stopped);
+  const auto loss = *planning::StatedLoss(*definition, stopped);
   ASSERT_TRUE(loss.resume.empty());
   EXPECT_GT(loss.stated, 1e-6);
   EXPECT_LE(loss.stated, 0.1);
@@ -172,7 +176,7 @@ TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
   constexpr Eigen::Index kSamples = 200;
   constexpr Eigen::Index kReadings = 5;
   constexpr double kLaterSd = 0.2;
-  Definition definition = *MakeDefinition(campaign::Campaign{});
+  planning::Definition definition = *planning::MakeDefinition(campaign::Campaign{});
   definition.campaign.early_stopping =
       campaign::EarlyStopping{.discard_at_most = 0.5, .exponent = 1};
   definition.priors =
@@ -180,7 +184,7 @@ TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
   for (int t = 0; t < kReadings; ++t) {
     definition.data.readings.push_back({.load_step = t, .value = 0, .sd = t == 0 ? 1 : kLaterSd});
   }
-  History complete;
+  planning::History complete;
   for (int k = 0; k < 2; ++k) {
     inference::Iteration iteration;
     if (k == 1) {  // narrower than the prior: samples that stop are worth more than one
@@ -202,22 +206,23 @@ TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
           {.sample = static_cast<int>(complete.samples.size()), .iteration = k});
     }
   }
-  History before = complete;
+  planning::History before = complete;
   before.iterations.pop_back();
-  const auto thresholds = *StopThresholds(definition, before, complete.iterations[1]);
+  const auto thresholds = *planning::StopThresholds(definition, before, complete.iterations[1]);
 
-  History stopped = complete;
+  planning::History stopped = complete;
   const auto likelihood =
       *inference::GaussianLikelihood::Create(definition.data, inference::NoiseMode::kGiven);
   for (int i = 0; i < kSamples; ++i) {
     Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(kReadings, std::nan(""));
     seen[0] = complete.iterations[1].predictions(i, 0);
-    if (BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+    if (planning::BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)])
+      continue;
     stopped.iterations[1].predictions.row(i).setConstant(std::nan(""));
     stopped.stopped[1].row(i) = seen;
     stopped.stopped_keys.push_back({0, static_cast<int>(kSamples) + i, 0});
   }
-  const auto loss = *StatedLoss(definition, stopped);
+  const auto loss = *planning::StatedLoss(definition, stopped);
   ASSERT_TRUE(loss.resume.empty());
   const Eigen::VectorXd with = GuidingWeights(definition, complete, 1);
   const Eigen::VectorXd without = GuidingWeights(definition, stopped, 1);
@@ -230,23 +235,23 @@ TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
 }
 
 TEST(EarlyStopping, AuditTakesAFiftiethOfTheStoppedChosenByTheSeed) {
-  const auto definition = MakeDefinition(campaign::Campaign{});
-  History history;
-  Loss loss;
-  EXPECT_TRUE(ToAudit(*definition, history, loss).empty());
+  const auto definition = planning::MakeDefinition(campaign::Campaign{});
+  planning::History history;
+  planning::Loss loss;
+  EXPECT_TRUE(planning::ToAudit(*definition, history, loss).empty());
   for (int i = 0; i < 101; ++i) {
     history.samples.push_back({.sample = i, .iteration = 0});
     loss.bounds[i] = 1e-6;
   }
-  const auto first = ToAudit(*definition, history, loss);
+  const auto first = planning::ToAudit(*definition, history, loss);
   ASSERT_EQ(first.size(), 3U);
   EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
-  EXPECT_EQ(ToAudit(*definition, history, loss), first);
+  EXPECT_EQ(planning::ToAudit(*definition, history, loss), first);
   for (const int sample : first) {
     history.samples[static_cast<std::size_t>(sample)].audited = 1e-6;
     loss.bounds.erase(sample);
   }
-  EXPECT_TRUE(ToAudit(*definition, history, loss).empty()) << "three of 101 are enough";
+  EXPECT_TRUE(planning::ToAudit(*definition, history, loss).empty()) << "three of 101 are enough";
 }
 
 TEST(EarlyStopping, AuditSaysWhatTheAuditedHold) {
@@ -254,15 +259,16 @@ TEST(EarlyStopping, AuditSaysWhatTheAuditedHold) {
   full.Submit(Campaign("", 0.2));
   full.RunToEnd(1, true);
   store::Reader reader = full.Read();
-  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
-  History history = *LoadHistory(*definition, 1, reader);
-  EXPECT_EQ(AuditOf(*definition, history)->samples, 0);
+  const auto definition =
+      *planning::LoadDefinition(methods::All(), reader, Value(reader.Campaign(1)).submitted);
+  planning::History history = *planning::LoadHistory(*definition, 1, reader);
+  EXPECT_EQ(planning::AuditOf(*definition, history)->samples, 0);
   const double exponent = *inference::GuidingExponent(
       definition->priors, definition->data, definition->campaign.filter, history.iterations);
   const Eigen::VectorXd weights = GuidingWeights(*definition, history, exponent);
   history.samples[3].audited = 0.01;
   history.samples[8].audited = 0.02;
-  const Audit audit = *AuditOf(*definition, history);
+  const planning::Audit audit = *planning::AuditOf(*definition, history);
   EXPECT_EQ(audit.samples, 2);
   EXPECT_DOUBLE_EQ(audit.bound, 0.03);
   EXPECT_NEAR(audit.measured, weights[3] + weights[8], 1e-12);
@@ -348,11 +354,12 @@ TEST(EarlyStopping, WhatWasStoppedTooSoonIsResumedUntilTheLossIsAllowed) {
     service.SendEnd(worker, lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
   }
   store::Reader reader = service.Read();
-  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
+  const auto definition =
+      *planning::LoadDefinition(methods::All(), reader, Value(reader.Campaign(1)).submitted);
   const auto likelihood =
       *inference::GaussianLikelihood::Create(definition->data, inference::NoiseMode::kGiven);
-  const double perfect =
-      BestPossible(likelihood, Eigen::RowVectorXd::Constant(likelihood.readings(), std::nan("")));
+  const double perfect = planning::BestPossible(
+      likelihood, Eigen::RowVectorXd::Constant(likelihood.readings(), std::nan("")));
   ASSERT_EQ(Value(reader.Samples(1)).size(), 2U * kSamples) << "the last iteration has begun";
   service.Write([perfect](store::Transaction& transaction) {
     for (int sample = kSamples; sample < 2 * kSamples; ++sample) {
@@ -399,7 +406,7 @@ TEST(EarlyStopping, WhatWasStoppedTooSoonIsResumedUntilTheLossIsAllowed) {
 TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
   constexpr int kSamples = 40;
   constexpr int kWanted = 16;  // 2 x 0.2 x 40
-  Definition definition = *MakeDefinition(campaign::Campaign{});
+  planning::Definition definition = *planning::MakeDefinition(campaign::Campaign{});
   definition.campaign.samples = kSamples;
   definition.campaign.filter = {.ess_target = 0.2, .seed = 3};
   definition.campaign.early_stopping = campaign::EarlyStopping{.discard_at_most = 1e-3};
@@ -414,7 +421,7 @@ TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
     for (const bool given : {false, true}) {
       definition.campaign.early_stopping->exponent =
           given ? std::optional<double>(1) : std::nullopt;
-      History history;
+      planning::History history;
       history.iterations = {iteration};
       history.iterations[0].predictions = iteration.parameters;
       history.iterations[0].predictions.bottomRows(kSamples - done).setConstant(std::nan(""));
@@ -424,7 +431,7 @@ TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
         history.samples.push_back(
             {.sample = i, .iteration = 0, .stop_below = -std::numeric_limits<double>::infinity()});
       }
-      const auto thresholds = *ThresholdsNow(definition, history);
+      const auto thresholds = *planning::ThresholdsNow(definition, history);
       const bool known = given || done >= kWanted;
       EXPECT_EQ(thresholds.size(), known ? static_cast<std::size_t>(kSamples - done) : 0U)
           << done << " finished, exponent " << (given ? "given" : "guiding");

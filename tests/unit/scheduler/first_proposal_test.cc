@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "server/campaign/file/derive.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/methods/registry.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -43,10 +44,10 @@ testing::SmallCampaign Derived(const std::string& method, const std::optional<Pl
   for (const auto& [name, center] : {std::pair{"young_modulus", place->young_modulus},
                                      {"friction_angle", place->friction_angle}})
     first.places[name] = {.center = center, .sd = kSd * center};
-  const auto text =
-      campaign::Derive(campaign.yaml, {.name = "derived",
-                                       .lineage = {.parent = "c1", .purpose = "extension"},
-                                       .first_proposal = first});
+  const auto text = campaign::Derive(methods::All(), campaign.yaml,
+                                     {.name = "derived",
+                                      .lineage = {.parent = "c1", .purpose = "extension"},
+                                      .first_proposal = first});
   EXPECT_TRUE(text.ok()) << text.status();
   campaign.yaml = *text;
   return campaign;
@@ -69,13 +70,13 @@ testing::SmallCampaign WithRows(int rows) {
   testing::SmallCampaign campaign = Derived("iterative_bayesian_filter", std::nullopt);
   campaign::Derivation derivation{.name = "derived",
                                   .lineage = {.parent = "c1", .purpose = "extension"},
-                                  .method = campaign::Method::kIterativeBayesianFilter};
+                                  .method = "iterative_bayesian_filter"};
   for (int i = 0; i < rows; ++i) {
     derivation.rows.push_back(
         {.like = 100 + i,
          .values = {{"young_modulus", 2e8 * (1 + 0.05 * i)}, {"friction_angle", 0.4}}});
   }
-  const auto text = campaign::Derive(campaign.yaml, derivation);
+  const auto text = campaign::Derive(methods::All(), campaign.yaml, derivation);
   EXPECT_TRUE(text.ok()) << text.status();
   campaign.yaml = *text;
   return campaign;

@@ -1,5 +1,5 @@
 // A design that grows: runs are added to it once all it had have ended.
-#include "server/scheduler/growth.h"
+#include "server/planning/growth.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,13 +27,13 @@ testing::SmallCampaign Design(const std::string& rows = "") {
                                   kCell, "  race: [load_cell_error]\n" + rows);
 }
 
-NewRuns Scout() {
+planning::NewRuns Scout() {
   return {.campaign = 1,
           .iteration = 0,
           .stage = SamplePurpose::kScout,
           .rows = {{{1e8, 0.3, 0}, 8}, {{1e8, 0.3, 0.1}, 9}, {{2e8, 0.4, 0.2}, 11}}};
 }
-NewRuns Main() {
+planning::NewRuns Main() {
   return {.campaign = 1,
           .iteration = 1,
           .stage = SamplePurpose::kMain,
@@ -45,7 +45,7 @@ S StateOf(SimulatedService& service, std::int64_t campaign = 1) {
   return Value(service.Read().Campaign(campaign)).progress.state;
 }
 
-void ExpectAdded(SimulatedService& service, const NewRuns& runs) {
+void ExpectAdded(SimulatedService& service, const planning::NewRuns& runs) {
   const auto added = service.AddRuns(runs);
   ASSERT_TRUE(added.ok()) << added.status();
   EXPECT_TRUE(*added);
@@ -94,11 +94,11 @@ TEST(Growth, ADesignIsFinishedBetweenItsBatches) {
   EXPECT_EQ(Value(service.Read().Evaluations(1)).size(), 8U);
   const auto iterations = Value(service.Read().Iterations(1));
   ASSERT_EQ(iterations.size(), 2U);
-  EXPECT_EQ(StageIn(iterations[0].proposal), SamplePurpose::kScout);
-  EXPECT_EQ(StageIn(iterations[1].proposal), SamplePurpose::kMain);
+  EXPECT_EQ(planning::StageIn(iterations[0].proposal), SamplePurpose::kScout);
+  EXPECT_EQ(planning::StageIn(iterations[1].proposal), SamplePurpose::kMain);
   EXPECT_FALSE(iterations[1].posterior.has_value());
-  EXPECT_EQ(StageIn("{}"), SamplePurpose::kEnsemble);
-  EXPECT_EQ(StageIn("\"draws\""), SamplePurpose::kEnsemble);
+  EXPECT_EQ(planning::StageIn("{}"), SamplePurpose::kEnsemble);
+  EXPECT_EQ(planning::StageIn("\"draws\""), SamplePurpose::kEnsemble);
 }
 
 TEST(Growth, RowsOfTheFileAreTheFirstBatch) {
@@ -143,7 +143,7 @@ TEST(Growth, AServerKilledWhileItAddsHasAllOrNothing) {
         ExpectAdded(service, Scout());
         service.RunToEnd(1, true);
       }
-      const NewRuns runs = in_second ? Main() : Scout();
+      const planning::NewRuns runs = in_second ? Main() : Scout();
       bool said = false;
       service.scheduler().AddRuns(
           runs, [&said](const absl::StatusOr<bool>& added) { said = added.ok() && *added; });
@@ -173,15 +173,15 @@ TEST(Growth, TheSameBatchIsThereAndAnotherOfItsNumberIsRefused) {
   SimulatedService service("growth_again");
   service.Submit(Design());
   ExpectAdded(service, Scout());
-  const auto again = [&service](const NewRuns& runs) { return service.AddRuns(runs); };
+  const auto again = [&service](const planning::NewRuns& runs) { return service.AddRuns(runs); };
   EXPECT_EQ(*again(Scout()), false) << "its runs are under way";
   service.RunToEnd(1, true);
   const std::string before = service.Fingerprint();
   EXPECT_EQ(*again(Scout()), false) << "its runs have ended";
-  NewRuns named = Scout();
+  planning::NewRuns named = Scout();
   named.experiments = {"tx2", "tx"};
   EXPECT_EQ(*again(named), false) << "all that are fitted, by name";
-  NewRuns other = Scout();
+  planning::NewRuns other = Scout();
   other.rows[1].values[2] = std::nextafter(0.1, 1);
   EXPECT_TRUE(absl::IsAlreadyExists(again(other).status())) << "another bit";
   other = Scout();
@@ -218,9 +218,9 @@ TEST(Growth, TwoWhoAddAtOnceAreAnsweredByTheirContent) {
   SimulatedService service("growth_two");
   service.Submit(Design());
   std::vector<absl::StatusOr<bool>> answers;
-  NewRuns other = Scout();
+  planning::NewRuns other = Scout();
   other.rows.pop_back();
-  for (const NewRuns& runs : {Scout(), Scout(), other}) {
+  for (const planning::NewRuns& runs : {Scout(), Scout(), other}) {
     service.scheduler().AddRuns(
         runs, [&answers](const absl::StatusOr<bool>& added) { answers.push_back(added); });
   }
@@ -236,41 +236,42 @@ TEST(Growth, IsRefusedInASentenceAndLeavesNothingBehind) {
   SimulatedService service("growth_refused");
   service.Submit(Design());
   const std::string before = service.Fingerprint();
-  const auto refusal = [&service](NewRuns runs, absl::StatusCode code) {
+  const auto refusal = [&service](planning::NewRuns runs, absl::StatusCode code) {
     const auto added = service.AddRuns(runs);
     EXPECT_EQ(added.status().code(), code) << added.status();
     return std::string(added.status().message());
   };
-  const auto with = [](const std::function<void(NewRuns&)>& change) {
-    NewRuns runs = Scout();
+  const auto with = [](const std::function<void(planning::NewRuns&)>& change) {
+    planning::NewRuns runs = Scout();
     change(runs);
     return runs;
   };
   using Code = absl::StatusCode;
-  EXPECT_THAT(refusal(with([](NewRuns& r) { r.campaign = 9; }), Code::kNotFound),
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.campaign = 9; }), Code::kNotFound),
               HasSubstr("no campaign c9"));
-  EXPECT_THAT(refusal(with([](NewRuns& r) { r.iteration = 1; }), Code::kFailedPrecondition),
-              HasSubstr("has 0 batches, so the next is 0"));
-  EXPECT_THAT(refusal(with([](NewRuns& r) { r.rows.clear(); }), Code::kInvalidArgument),
+  EXPECT_THAT(
+      refusal(with([](planning::NewRuns& r) { r.iteration = 1; }), Code::kFailedPrecondition),
+      HasSubstr("has 0 batches, so the next is 0"));
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.rows.clear(); }), Code::kInvalidArgument),
               HasSubstr("0 rows; allowed: 1 to 256"));
-  EXPECT_THAT(
-      refusal(with([](NewRuns& r) { r.rows.resize(257, r.rows[0]); }), Code::kInvalidArgument),
-      HasSubstr("257 rows"));
-  EXPECT_THAT(
-      refusal(with([](NewRuns& r) { r.rows[1].values.pop_back(); }), Code::kInvalidArgument),
-      HasSubstr("row 1: a row has 2 values, and the campaign has 3 parameters"));
-  EXPECT_THAT(
-      refusal(with([](NewRuns& r) { r.rows[2].values[1] = std::nan(""); }), Code::kInvalidArgument),
-      HasSubstr("row 2: friction_angle is not finite"));
-  EXPECT_THAT(
-      refusal(with([](NewRuns& r) { r.rows[0].values[2] = 0.005; }), Code::kInvalidArgument),
-      HasSubstr("row 0: load_cell_error.gain = 0.005 lies outside its prior"));
-  EXPECT_THAT(refusal(with([](NewRuns& r) {
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.rows.resize(257, r.rows[0]); }),
+                      Code::kInvalidArgument),
+              HasSubstr("257 rows"));
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.rows[1].values.pop_back(); }),
+                      Code::kInvalidArgument),
+              HasSubstr("row 1: a row has 2 values, and the campaign has 3 parameters"));
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.rows[2].values[1] = std::nan(""); }),
+                      Code::kInvalidArgument),
+              HasSubstr("row 2: friction_angle is not finite"));
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.rows[0].values[2] = 0.005; }),
+                      Code::kInvalidArgument),
+              HasSubstr("row 0: load_cell_error.gain = 0.005 lies outside its prior"));
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) {
                         r.experiments = {"tx", "tz"};
                       }),
                       Code::kInvalidArgument),
               HasSubstr("some are not in campaign c1, which has tx, tx2"));
-  EXPECT_THAT(refusal(with([](NewRuns& r) {
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) {
                         r.experiments = {"tx", "tx"};
                       }),
                       Code::kInvalidArgument),
@@ -288,7 +289,7 @@ TEST(Growth, IsRefusedInASentenceAndLeavesNothingBehind) {
   service.ports().Run();
   EXPECT_THAT(refusal(Main(), Code::kFailedPrecondition), HasSubstr("that is cancelled"));
   service.Submit(testing::MakeSmallCampaign({}));
-  EXPECT_THAT(refusal(with([](NewRuns& r) { r.campaign = 2; }), Code::kInvalidArgument),
+  EXPECT_THAT(refusal(with([](planning::NewRuns& r) { r.campaign = 2; }), Code::kInvalidArgument),
               HasSubstr("iterative_bayesian_filter; runs are added to a design alone"));
   service.Submit(testing::MakeSmallDesign({}, kAdhesion, "  race: [adhesion_dmt, adhesion_jkr]\n"));
   EXPECT_THAT(refusal({.campaign = 3, .rows = {{{1e8, 0.3, 0.1, 0.1}, 0}}}, Code::kInvalidArgument),

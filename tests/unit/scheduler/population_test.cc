@@ -8,8 +8,8 @@
 #include <string>
 
 #include "absl/strings/str_replace.h"
-#include "server/scheduler/answer.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/answer.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -27,15 +27,15 @@ TEST(Populations, MembersFollowFromTheirPartsSampleBySample) {
       9, 20, 2, 1, -1,      //
       9, 30, 0, 5, 5;
   const Eigen::Vector3d weights(0.5, 0.25, 0.25);
-  const auto members = SummarizeMembers(campaign, draws, weights.array().log());
+  const auto members = planning::SummarizeMembers(campaign, draws, weights.array().log());
   ASSERT_EQ(members.size(), 2U);
   EXPECT_DOUBLE_EQ(members[0].mean, 0.5 * 10 + 0.25 * 22 + 0.25 * 30);
   EXPECT_DOUBLE_EQ(members[1].mean, 0.5 * 12 + 0.25 * 18 + 0.25 * 30);
   EXPECT_NEAR(members[1].sd, std::sqrt(0.5 * 36 + 0 + 0.25 * 144), 1e-12);
   EXPECT_FALSE(members[0].at_bound);
-  EXPECT_DOUBLE_EQ(SummarizeMembers(campaign, draws)[0].mean, (10 + 22 + 30) / 3.0);
+  EXPECT_DOUBLE_EQ(planning::SummarizeMembers(campaign, draws)[0].mean, (10 + 22 + 30) / 3.0);
   campaign.populations.clear();
-  EXPECT_TRUE(SummarizeMembers(campaign, draws).empty());
+  EXPECT_TRUE(planning::SummarizeMembers(campaign, draws).empty());
 }
 
 testing::SmallCampaign PerExperiment(const std::string& method) {

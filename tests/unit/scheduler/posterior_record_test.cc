@@ -1,4 +1,4 @@
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 
 #include <gtest/gtest.h>
 
@@ -16,10 +16,10 @@ TEST(PosteriorRecord, JsonKeepsEveryBit) {
   posterior.set_pareto_k(std::numeric_limits<double>::infinity());
   posterior.add_parameters()->set_mean(0.1 + 0.2);
   posterior.add_warnings("few \"effective\" samples");
-  const auto back = PosteriorFromJson(PosteriorToJson(posterior));
+  const auto back = planning::PosteriorFromJson(planning::PosteriorToJson(posterior));
   ASSERT_TRUE(back.ok()) << back.status();
   EXPECT_EQ(back->SerializeAsString(), posterior.SerializeAsString());
-  EXPECT_EQ(MeansOf(*back).parameters.front().mean, 0.1 + 0.2);
+  EXPECT_EQ(planning::MeansOf(*back).parameters.front().mean, 0.1 + 0.2);
 }
 
 TEST(PosteriorRecord, ProposalKeepsEveryBit) {
@@ -31,7 +31,7 @@ TEST(PosteriorRecord, ProposalKeepsEveryBit) {
   component.mean = Eigen::Vector2d(0.1, -2.0 / 3.0);
   component.covariance = Eigen::Matrix2d{{1.1, 0.3}, {0.3, 2.2}};
   proposal.components.push_back(component);
-  const auto back = ProposalFromJson(ProposalToJson(proposal));
+  const auto back = planning::ProposalFromJson(planning::ProposalToJson(proposal));
   ASSERT_TRUE(back.ok()) << back.status();
   EXPECT_EQ(back->log_acceptance, proposal.log_acceptance);
   EXPECT_EQ(back->components.front().weight, component.weight);
@@ -40,8 +40,8 @@ TEST(PosteriorRecord, ProposalKeepsEveryBit) {
 }
 
 TEST(PosteriorRecord, DamagedTextIsDataLoss) {
-  EXPECT_EQ(PosteriorFromJson("{").status().code(), absl::StatusCode::kDataLoss);
-  EXPECT_EQ(ProposalFromJson("{}").status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(planning::PosteriorFromJson("{").status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(planning::ProposalFromJson("{}").status().code(), absl::StatusCode::kDataLoss);
 }
 
 }  // namespace

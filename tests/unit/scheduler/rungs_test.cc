@@ -1,10 +1,10 @@
-#include "server/scheduler/rungs.h"
+#include "server/planning/rungs.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {

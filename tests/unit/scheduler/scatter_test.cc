@@ -1,6 +1,6 @@
 // Realizations: the best estimate is run on every packing, and what the runs differ by joins the
 // errors.
-#include "server/scheduler/scatter.h"
+#include "server/planning/scatter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/scheduler/history.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/methods/registry.h"
+#include "server/planning/history.h"
+#include "server/planning/posterior_record.h"
 #include "server/service/queries.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
@@ -56,14 +57,15 @@ Ended RunCampaign(const std::string& name, const testing::SmallCampaign& campaig
             .samples = Value(service.Read().Samples(1)),
             .evaluations = Value(service.Read().EffortOf(1)).model_evaluations};
   for (const store::IterationRecord& iteration : run.iterations) {
-    if (iteration.posterior.has_value()) run.posterior = *PosteriorFromJson(*iteration.posterior);
+    if (iteration.posterior.has_value())
+      run.posterior = *planning::PosteriorFromJson(*iteration.posterior);
   }
   return run;
 }
 
 campaign::Campaign ReadCampaignOf(const testing::SmallCampaign& campaign) {
-  campaign::ReadOutcome read =
-      campaign::ReadCampaign(campaign.yaml, "c.yaml", [&campaign](const std::string& path) {
+  campaign::ReadOutcome read = campaign::ReadCampaign(
+      methods::All(), campaign.yaml, "c.yaml", [&campaign](const std::string& path) {
         const auto file = campaign.files.find(path);
         return file != campaign.files.end() ? absl::StatusOr<std::string>(file->second)
                                             : absl::NotFoundError(path);
@@ -85,8 +87,9 @@ void ExpectTroubleChangesNoBit(int packings) {
 }
 
 // A scatter of sd one of every observable.
-MeasuredScatter Measured(const Definition& definition, const char* from, int runs) {
-  MeasuredScatter measured;
+planning::MeasuredScatter Measured(const planning::Definition& definition, const char* from,
+                                   int runs) {
+  planning::MeasuredScatter measured;
   for (const auto& [group, readings] : inference::GroupsOf(definition.data)) {
     const auto n = static_cast<Eigen::Index>(readings.size());
     measured.observables.push_back({.group = {.experiment = group.first,
@@ -109,7 +112,7 @@ TEST(Realizations, ReplicatesAreMadeAsOftenAsTheCampaignSays) {
                                   Campaign(4, "", "  replicates: " + number + "\n"), 0.05);
     int count = 0;
     for (const store::IterationRecord& iteration : run.iterations) {
-      if (iteration.proposal != kReplicates) continue;
+      if (iteration.proposal != planning::kReplicates) continue;
       for (const store::SampleRecord& sample : run.samples) {
         count += sample.iteration == iteration.number ? 1 : 0;
       }
@@ -127,8 +130,9 @@ TEST(Realizations, BestEstimateRunsOnEveryPacking) {
   // say.
   ASSERT_EQ(one.posterior.scatter_size(), 1);
   EXPECT_EQ(one.posterior.scatter(0).from(), "emulator");
-  const auto replicates = std::find_if(four.iterations.begin(), four.iterations.end(),
-                                       [](const auto& i) { return i.proposal == kReplicates; });
+  const auto replicates =
+      std::find_if(four.iterations.begin(), four.iterations.end(),
+                   [](const auto& i) { return i.proposal == planning::kReplicates; });
   ASSERT_NE(replicates, four.iterations.end());
   EXPECT_FALSE(replicates->posterior.has_value());
   std::vector<const store::SampleRecord*> runs;
@@ -163,8 +167,8 @@ TEST(Twins, OfTheBestEstimateOnTheOnlyPackingAreMadeAsOftenAsTheCampaignSays) {
   v1::Posterior posterior;
   std::vector<store::SampleRecord> repeats;
   for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior) posterior = *PosteriorFromJson(*iteration.posterior);
-    if (iteration.proposal != kReplicates) continue;
+    if (iteration.posterior) posterior = *planning::PosteriorFromJson(*iteration.posterior);
+    if (iteration.proposal != planning::kReplicates) continue;
     for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
       if (sample.iteration == iteration.number) repeats.push_back(sample);
     }
@@ -189,7 +193,7 @@ TEST(Twins, OfTheBestEstimateOnTheOnlyPackingAreMadeAsOftenAsTheCampaignSays) {
 
 std::size_t TwinsOf(const Ended& run) {
   for (const store::IterationRecord& iteration : run.iterations) {
-    if (iteration.proposal != kReplicates) continue;
+    if (iteration.proposal != planning::kReplicates) continue;
     return static_cast<std::size_t>(std::count_if(
         run.samples.begin(), run.samples.end(),
         [&iteration](const auto& sample) { return sample.iteration == iteration.number; }));
@@ -258,8 +262,9 @@ TEST(Twins, TroubleChangesNoBit) { ExpectTroubleChangesNoBit(1); }
 
 // The scatter joins the errors once, its size known from the twins.
 TEST(Twins, ErrorsAreKnownFromAsManyAsThereAreAndTheMeanIsNotOffByThem) {
-  const Definition definition = *MakeDefinition(ReadCampaignOf(Campaign(1)));
-  const Definition with = DefinitionWith(definition, Measured(definition, "repeats", 8));
+  const planning::Definition definition = *planning::MakeDefinition(ReadCampaignOf(Campaign(1)));
+  const planning::Definition with =
+      planning::DefinitionWith(definition, Measured(definition, "repeats", 8));
   EXPECT_EQ(with.known.packings, 8);
   EXPECT_GE(with.known.Freedom(), 7);
   EXPECT_TRUE(std::isfinite(with.known.Freedom()));
@@ -292,9 +297,10 @@ TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter
 
 // The p-value of the posterior asks how many packings the scatter is known from.
 TEST(Realizations, ErrorsAreKnownFromAsManyPackingsAsThereAre) {
-  const Definition definition = *MakeDefinition(ReadCampaignOf(Campaign(4)));
+  const planning::Definition definition = *planning::MakeDefinition(ReadCampaignOf(Campaign(4)));
   EXPECT_EQ(definition.known.packings, 0);
-  const Definition with = DefinitionWith(definition, Measured(definition, "realizations", 3));
+  const planning::Definition with =
+      planning::DefinitionWith(definition, Measured(definition, "realizations", 3));
   EXPECT_EQ(with.known.packings, 3);  // one of the four did not finish
   EXPECT_EQ(with.known.readings, static_cast<double>(with.data.readings.size()));
   // Two degrees of freedom where the scatter is all there is, more where noise stands beside it.
@@ -317,7 +323,8 @@ TEST(Realizations, AFinishedPosteriorCountsItsHeldOutRuns) {
   simulated.RunToEnd(1, true);
   store::Reader reader = simulated.Read();
   const auto total = Value(service::StatusOf(reader, 1, std::nullopt)).model_evaluations();
-  const v1::Posterior stored = *PosteriorFromJson(*Value(reader.Iterations(1))[1].posterior);
+  const v1::Posterior stored =
+      *planning::PosteriorFromJson(*Value(reader.Iterations(1))[1].posterior);
   EXPECT_GT(total, stored.model_evaluations());
   EXPECT_EQ(Value(service::PosteriorOf(reader, 1, std::nullopt)).model_evaluations(), total);
   EXPECT_EQ(Value(service::PosteriorOf(reader, 1, 1)).model_evaluations(), total);
@@ -330,7 +337,7 @@ TEST(Realizations, BudgetAllows) {
   const Ended run =
       RunCampaign("scatter_budget", Campaign(4, "budget: {model_evaluations: 125}\n"), 0.05);
   EXPECT_TRUE(std::none_of(run.iterations.begin(), run.iterations.end(),
-                           [](const auto& i) { return i.proposal == kReplicates; }));
+                           [](const auto& i) { return i.proposal == planning::kReplicates; }));
   EXPECT_LE(run.evaluations, 125 + 20);  // held-out draws are not counted in advance
 }
 

@@ -11,15 +11,13 @@
 
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/sha256.h"
-#include "server/scheduler/history.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/history.h"
+#include "server/planning/posterior_record.h"
 
 namespace calib::scheduler {
 namespace {
 
-constexpr SchedulerOptions kOptions{.lease = std::chrono::milliseconds(1000),
-                                    .heartbeat = std::chrono::milliseconds(100),
-                                    .most_campaigns = kMostCampaigns};
+constexpr std::chrono::milliseconds kLease(1000);
 
 /// A smooth curve with the parameters in it, in place of the mechanics.
 double Model(const v1::AttemptSpec& spec, int load_step, double packing_scatter,
@@ -86,8 +84,8 @@ void SimulatedPorts::Close(std::int64_t session, const absl::Status& /*status*/)
   closed.push_back(session);
 }
 
-SimulatedService::SimulatedService(const std::string& name)
-    : path_(::testing::TempDir() + "/simulated_" + name + ".db") {
+SimulatedService::SimulatedService(const std::string& name, const campaign::MethodList& methods)
+    : methods_(&methods), path_(::testing::TempDir() + "/simulated_" + name + ".db") {
   for (const char* suffix : {"", "-wal", "-shm"}) {
     std::filesystem::remove(path_ + suffix);
   }
@@ -104,7 +102,11 @@ void SimulatedService::Restart() {
   store_ = *std::move(opened);
   ports_ = std::make_unique<SimulatedPorts>(*store_);
   ports_->now = now;
-  scheduler_ = std::make_unique<Scheduler>(*ports_, kOptions);
+  scheduler_ = std::make_unique<Scheduler>(
+      *ports_, SchedulerOptions{.lease = kLease,
+                                .heartbeat = std::chrono::milliseconds(100),
+                                .most_campaigns = kMostCampaigns,
+                                .methods = methods_});
   const absl::Status status = scheduler_->Load();
   EXPECT_TRUE(status.ok()) << status;
   ports_->Run();
@@ -119,15 +121,15 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,
         store_->WriteNow([&](store::Transaction& t) { t.PutBlob(digests[path], content); }).ok());
   }
   store::Reader reader = Read();
-  const auto outcome =
-      campaign::ReadCampaign(campaign.yaml, "small.yaml", StoredFiles(reader, digests));
+  const auto outcome = campaign::ReadCampaign(*methods_, campaign.yaml, "small.yaml",
+                                              planning::StoredFiles(reader, digests));
   EXPECT_TRUE(outcome.problems.empty()) << campaign::ToString(outcome.problems.front());
   std::string id;
   scheduler_->Submit({.name = "small",
                       .yaml = campaign.yaml,
                       .file_name = "small.yaml",
-                      .method = outcome.campaign.method,
-                      .samples = LargestIteration(outcome.campaign),
+                      .method = outcome.campaign.method->name(),
+                      .samples = planning::LargestIteration(outcome.campaign),
                       .max_iterations = outcome.campaign.max_iterations,
                       .owner = owner},
                      digests, "", {}, [&](const absl::StatusOr<std::string>& answer) {
@@ -138,7 +140,7 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,
   return id;
 }
 
-absl::StatusOr<bool> SimulatedService::AddRuns(const NewRuns& runs) {
+absl::StatusOr<bool> SimulatedService::AddRuns(const planning::NewRuns& runs) {
   absl::StatusOr<bool> added = absl::UnknownError("no answer");
   scheduler_->AddRuns(runs, [&added](const absl::StatusOr<bool>& answer) { added = answer; });
   ports_->Run();
@@ -203,7 +205,7 @@ void SimulatedService::SendEnd(std::int64_t session, std::int64_t attempt,
 }
 
 void SimulatedService::Advance(std::chrono::milliseconds time) {
-  constexpr std::chrono::milliseconds kTick = kOptions.lease / 4;  // as Core
+  constexpr std::chrono::milliseconds kTick = kLease / 4;  // as Core
   for (auto left = time; left.count() > 0; left -= kTick) {
     StandStill(std::min(left, kTick));
   }
@@ -422,7 +424,7 @@ std::vector<store::SampleRecord> SamplesRun(SimulatedService& service) {
 v1::Posterior LastPosterior(SimulatedService& service) {
   v1::Posterior last;
   for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
+    if (iteration.posterior.has_value()) last = *planning::PosteriorFromJson(*iteration.posterior);
   }
   return last;
 }

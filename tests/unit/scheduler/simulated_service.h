@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/methods/registry.h"
 #include "server/scheduler/scheduler.h"
 #include "tests/support/client.h"
 #include "tests/support/small_campaign.h"
@@ -63,13 +64,19 @@ inline constexpr int kMostCampaigns = 12;
 /// closed formula, so that a whole campaign takes milliseconds.
 class SimulatedService {
  public:
-  explicit SimulatedService(const std::string& name);
+  explicit SimulatedService(const std::string& name,
+                            const campaign::MethodList& methods = methods::All());
 
   /// A new server process on the same file: memory is gone, streams are cut.
   void Restart();
+  /// Of a build that has these methods.
+  void RestartWith(const campaign::MethodList& methods) {
+    methods_ = &methods;
+    Restart();
+  }
   std::string Submit(const testing::SmallCampaign& campaign,
                      const std::function<void()>& answered = {});
-  absl::StatusOr<bool> AddRuns(const NewRuns& runs);
+  absl::StatusOr<bool> AddRuns(const planning::NewRuns& runs);
   std::int64_t Connect(const std::string& worker, int slots,
                        const std::vector<std::int64_t>& held = {});
   /// The next message of this kind for a session, others skipped; an empty message when there is
@@ -133,6 +140,7 @@ class SimulatedService {
   void Absorb(Simulated& worker);
   void Step(Simulated& worker, std::mt19937& random);
 
+  const campaign::MethodList* methods_;
   const std::string path_;
   std::unique_ptr<store::Store> store_;
   std::unique_ptr<SimulatedPorts> ports_;

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "inference/sampling/philox.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -33,7 +33,7 @@ testing::SmallCampaign Campaign(int samples, int times, double noise, const std:
 }
 
 v1::Posterior Posterior(SimulatedService& service, std::size_t iteration) {
-  return *PosteriorFromJson(*Value(service.Read().Iterations(1)).at(iteration).posterior);
+  return *planning::PosteriorFromJson(*Value(service.Read().Iterations(1)).at(iteration).posterior);
 }
 
 TEST(SurrogateCampaign, FindsABetterFitThanTheDesign) {

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -69,7 +69,8 @@ TEST(FewSurvivors, AfterTheLastIterationThereIsNoPosteriorAndWhatWouldHelp) {
   SimulatedService service("last_survivor");
   RunIteration(service, 1, "given", "sqmc");
   EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished);
-  const auto posterior = PosteriorFromJson(*Value(service.Read().Iterations(1)).front().posterior);
+  const auto posterior =
+      planning::PosteriorFromJson(*Value(service.Read().Iterations(1)).front().posterior);
   ASSERT_TRUE(posterior.ok());
   EXPECT_EQ(posterior->posterior_from(), "none");
   EXPECT_TRUE(std::isnan(posterior->parameters(0).sd()));

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "server/scheduler/history.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/history.h"
+#include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -111,7 +111,7 @@ TEST_F(FinishedTmcmcCampaign, HasRunHeldOutTestsOnSomeOfTheChains) {
   const auto samples = Value(service_->Read().Samples(1));
   auto held_out = EvaluationsOf(*service_, 1);
   const store::IterationRecord last = Value(service_->Read().Iterations(1)).back();
-  ASSERT_EQ(last.proposal, kReplicates);
+  ASSERT_EQ(last.proposal, planning::kReplicates);
   const auto twins = std::erase_if(held_out, [&](const store::EvaluationRecord& evaluation) {
     return samples[static_cast<std::size_t>(evaluation.key.sample)].iteration == last.number;
   });

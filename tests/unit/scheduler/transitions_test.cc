@@ -1,4 +1,4 @@
-#include "server/scheduler/transitions.h"
+#include "server/planning/transitions.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@ namespace calib::scheduler {
 namespace {
 
 using S = CampaignState;
-using E = CampaignEvent;
+using E = planning::CampaignEvent;
 
 constexpr std::array kStates = {S::kQueued,   S::kRunning, S::kPaused,
                                 S::kFinished, S::kFailed,  S::kCancelled};
@@ -38,7 +38,8 @@ TEST(Transitions, EveryLiveCampaignCanBeCancelledOrFail) {
 
 TEST(Transitions, OnlyQueuedAndRunningCampaignsAreWorkedOn) {
   for (const S state : kStates) {
-    EXPECT_EQ(IsLeasable(state), state == S::kQueued || state == S::kRunning) << ToString(state);
+    EXPECT_EQ(planning::IsLeasable(state), state == S::kQueued || state == S::kRunning)
+        << ToString(state);
   }
 }
 

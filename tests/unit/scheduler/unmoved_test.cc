@@ -1,4 +1,4 @@
-#include "server/scheduler/unmoved.h"
+#include "server/planning/unmoved.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,26 +30,26 @@ inference::Iteration Runs(Eigen::Index count, double slope_a, double slope_b) {
 
 // Readings have an sd of 0.1, a tenth of which is what counts.
 TEST(Unmoved, AnObservableThatNoRunChangesIsNamed) {
-  const auto definition = MakeDefinition(testing::SquareCampaign());
+  const auto definition = planning::MakeDefinition(testing::SquareCampaign());
   const inference::Iteration still = Runs(30, 0, 0.005);
-  EXPECT_THAT(UnmovedReadings(*definition, {&still, 1}),
+  EXPECT_THAT(planning::UnmovedReadings(*definition, {&still, 1}),
               ElementsAre(HasSubstr("tx, q_over_p: is the same in all 30 runs")));
   const inference::Iteration moved = Runs(30, 0, 0.05);
-  EXPECT_THAT(UnmovedReadings(*definition, {&moved, 1}), IsEmpty());
+  EXPECT_THAT(planning::UnmovedReadings(*definition, {&moved, 1}), IsEmpty());
   const inference::Iteration alone = Runs(1, 0, 0);
-  EXPECT_THAT(UnmovedReadings(*definition, {&alone, 1}), IsEmpty());
+  EXPECT_THAT(planning::UnmovedReadings(*definition, {&alone, 1}), IsEmpty());
   inference::Iteration diverged = Runs(30, 0, 0.05);  // what is left is one run
   diverged.predictions.bottomRows(29).setConstant(std::nan(""));
-  EXPECT_THAT(UnmovedReadings(*definition, {&diverged, 1}), IsEmpty());
+  EXPECT_THAT(planning::UnmovedReadings(*definition, {&diverged, 1}), IsEmpty());
 }
 
 TEST(Unmoved, AParameterWhosePosteriorIsItsPriorIsNamed) {
-  const auto definition = MakeDefinition(testing::SquareCampaign());
+  const auto definition = planning::MakeDefinition(testing::SquareCampaign());
   const auto said = [&definition](double slope_a, double slope_b) {
     const inference::Iteration runs = Runs(400, slope_a, slope_b);
-    const auto answer = FindAnswer(*definition, {&runs, 1});
+    const auto answer = planning::FindAnswer(*definition, {&runs, 1});
     EXPECT_TRUE(answer.ok() && answer->HasIntervals()) << answer.status();
-    return UnmovedParameters(*definition, *answer);
+    return planning::UnmovedParameters(*definition, *answer);
   };
   EXPECT_THAT(said(0, 0), HasSubstr("The posterior is the prior"));
   EXPECT_THAT(said(0.5, 0), HasSubstr("The posterior of b is its prior"));

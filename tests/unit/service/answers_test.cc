@@ -8,7 +8,7 @@
 #include "proto/rpc/check_message.h"
 #include "server/campaign/file/text/origin.h"
 #include "server/campaign/model/sha256.h"
-#include "server/scheduler/posterior_record.h"
+#include "server/planning/posterior_record.h"
 #include "server/service/calls.h"
 #include "server/service/queries.h"
 #include "server/service/server.h"
@@ -66,7 +66,7 @@ class Answers : public ::testing::Test {
   static std::string Posterior(double misfit) {
     v1::Posterior posterior;
     posterior.set_best_misfit(misfit);
-    return scheduler::PosteriorToJson(posterior);
+    return planning::PosteriorToJson(posterior);
   }
 
   std::string folder_;

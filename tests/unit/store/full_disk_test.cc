@@ -36,7 +36,7 @@ class FullDisk : public testing::Test {
     ASSERT_TRUE(opened.ok()) << opened.status();
     store_ = *std::move(opened);
     const auto campaign = [](Transaction& t) {
-      t.InsertCampaign({.id = 1, .name = "sand", .method = Method::kSqmc, .samples = 1}, {});
+      t.InsertCampaign({.id = 1, .name = "sand", .method = "sqmc", .samples = 1}, {});
     };
     ASSERT_TRUE(store_->WriteNow(campaign).ok());
     store_->Watch([this](const absl::Status& room) {

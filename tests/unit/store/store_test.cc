@@ -48,7 +48,7 @@ class StoreTest : public testing::Test {
   /// One campaign, one iteration, one sample, one evaluation.
   static void PutEvaluation(Transaction& t) {
     t.InsertCampaign(
-        {.id = 1, .name = "sand", .yaml = "name: sand", .method = Method::kSqmc, .samples = 1}, {});
+        {.id = 1, .name = "sand", .yaml = "name: sand", .method = "sqmc", .samples = 1}, {});
     t.InsertIteration(1, 0, "{}");
     t.InsertSample(1, {.sample = 0, .iteration = 0, .parameters = {1e9, 0.1}});
     t.InsertEvaluation({.key = kKey, .digest = "d"});
@@ -65,7 +65,7 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
                              .yaml = "name: sand\n",
                              .file_name = "sand.yaml",
                              .seed = std::numeric_limits<std::uint64_t>::max(),
-                             .method = Method::kSqmc,
+                             .method = "sqmc",
                              .samples = 10,
                              .max_iterations = 3,
                              .created_unix_ms = 1234,
@@ -399,7 +399,7 @@ TEST_F(StoreTest, AReaderSeesOneMomentOnly) {
   Reader reader = Read();
   EXPECT_EQ(reader.Campaigns()->size(), 1U);
   Write([](Transaction& t) {
-    t.InsertCampaign({.id = 2, .name = "clay", .method = Method::kSqmc, .samples = 1}, {});
+    t.InsertCampaign({.id = 2, .name = "clay", .method = "sqmc", .samples = 1}, {});
   });
   EXPECT_EQ(reader.Campaigns()->size(), 1U);
   EXPECT_EQ(Read().Campaigns()->size(), 2U);

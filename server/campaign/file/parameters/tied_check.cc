@@ -195,7 +195,7 @@ std::vector<std::string> CircleFrom(const std::string& start, const std::string&
 // Of a design: what its runs may lack.
 bool IsOfRuns(const Campaign& campaign, const std::string& name) {
   const std::string effect = EffectNamedIn(name);
-  const bool numerics = campaign.method == Method::kDesign && IsNumerics(campaign, name);
+  const bool numerics = RunsAreAdded(campaign) && IsNumerics(campaign, name);
   return numerics ||
          std::find(campaign.race.begin(), campaign.race.end(), effect) != campaign.race.end();
 }

@@ -215,7 +215,7 @@ void CheckNumerics(const MapReader& campaign_map, const Campaign& campaign,
                                                  " is a parameter as well: what is calibrated "
                                                  "matters; keep one of them"));
     }
-    if (campaign.method != Method::kDesign && parameters.contains(prefix + name)) {
+    if (!RunsAreAdded(campaign) && parameters.contains(prefix + name)) {
       campaign_map.Problem(
           "parameters", absl::StrCat(prefix, name, " is what diagnose calls the change of ", name,
                                      "; call the parameter another"));

@@ -237,10 +237,22 @@ std::optional<std::vector<std::pair<std::string, std::string>>> MapReader::TextM
   return texts;
 }
 
+const Section& MapReader::SectionBelow(const std::string& name) const {
+  for (const Section& section : section_->of_keys) {
+    if (section.name == name) return section;
+  }
+  return SectionOf(name);
+}
+
 std::optional<MapReader> MapReader::Map(const std::string& key) {
+  if (Find(key) == nullptr) return std::nullopt;
+  return Map(key, SectionBelow(FormOf(key, Form::Kind::kMap).section));
+}
+
+std::optional<MapReader> MapReader::Map(const std::string& key, const Section& section) {
   const YamlNode* node = Find(key);
   if (node == nullptr) return std::nullopt;
-  MapReader map(*node, PathOf(key), SectionOf(FormOf(key, Form::Kind::kMap).section), *problems_);
+  MapReader map(*node, PathOf(key), section, *problems_);
   if (map.node_ == nullptr) return std::nullopt;
   map.line_ = LineOf(key);
   return map;

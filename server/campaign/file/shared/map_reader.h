@@ -73,6 +73,8 @@ class MapReader {
   /// A map of texts: {our_name: column}.
   std::optional<std::vector<std::pair<std::string, std::string>>> TextMap(const std::string& key);
   std::optional<MapReader> Map(const std::string& key);
+  /// With the keys of this section, which must outlive what is returned.
+  std::optional<MapReader> Map(const std::string& key, const Section& section);
 
   /// Marks keys as known without reading them.
   void Ignore(const std::vector<std::string>& keys);
@@ -81,6 +83,7 @@ class MapReader {
 
  private:
   const YamlEntry* FindEntry(const std::string& key) const;
+  const Section& SectionBelow(const std::string& name) const;
   // The form of this kind that the section gives a key, which has one.
   const Form& FormOf(const std::string& key, Form::Kind kind) const;
 

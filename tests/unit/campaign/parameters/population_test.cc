@@ -12,6 +12,7 @@
 #include "server/campaign/checks/warning.h"
 #include "server/campaign/file/derive.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -57,7 +58,7 @@ std::map<std::string, std::string> ProgramFiles() {
 }
 
 ReadOutcome Read(const std::string& yaml, const std::map<std::string, std::string>& files) {
-  return ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  return ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(files));
 }
 Campaign Good(const ReadOutcome& outcome) {
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
@@ -298,7 +299,7 @@ TEST(Population, ABatchThatNobodyReadsIsWarnedOf) {
 // --- what is derived -----------------------------------------------------------------------------
 
 std::string Derived(const Derivation& derivation) {
-  const auto text = Derive(ProgramYaml(kPerBatch), derivation);
+  const auto text = Derive(methods::All(), ProgramYaml(kPerBatch), derivation);
   EXPECT_TRUE(text.ok()) << text.status();
   return text.value_or("");
 }
@@ -320,9 +321,9 @@ TEST(Population, KeepsItsLabelsWithoutTheHeldOut) {
   EXPECT_EQ(c.experiments.size(), 3U);
   EXPECT_THAT(c.populations[0].labels, ElementsAre("A", "B", "C"));
   EXPECT_THAT(NamesIn(c), Contains("stiffness@C.score"));
-  const std::string again =
-      *Derive(Derived({.name = "one", .lineage = {.parent = "c1", .purpose = "extension"}}),
-              {.name = "two", .lineage = {.parent = "c2", .purpose = "extension"}});
+  const std::string again = *Derive(
+      methods::All(), Derived({.name = "one", .lineage = {.parent = "c1", .purpose = "extension"}}),
+      {.name = "two", .lineage = {.parent = "c2", .purpose = "extension"}});
   EXPECT_EQ(NamesIn(GoodSprings(again)), NamesIn(c));
 }
 

@@ -11,6 +11,7 @@
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/campaign/model/race.h"
 #include "server/campaign/model/run_settings.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -37,7 +38,7 @@ std::string Replaced(std::string yaml, const std::string& from, const std::strin
 }
 
 Campaign ReadGood(const std::string& yaml) {
-  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  const ReadOutcome outcome = ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   return outcome.campaign;
 }
@@ -151,7 +152,7 @@ inference: {samples: 10}
 TEST(CalibratedSettings, MayBeAControlWithOneReading) {
   const std::string head = "opening,mass_flow_rate\n";
   const auto read = [&](const std::string& rows) {
-    return ReadCampaign(kSilo, "c.yaml", ReaderOf({{"silo.csv", head + rows}}));
+    return ReadCampaign(methods::All(), kSilo, "c.yaml", ReaderOf({{"silo.csv", head + rows}}));
   };
   const ReadOutcome one = read("30,0.5\n");
   for (const Problem& problem : one.problems) ADD_FAILURE() << ToString(problem);
@@ -171,8 +172,8 @@ TEST(CalibratedSettings, ThatATestCannotHaveAtAnEndOfTheirPriorAreRefused) {
   std::string yaml = Replaced(kSilo, "opening: {prior: uniform, min: 20 mm, max: 40 mm}",
                               "silo_width: {prior: uniform, min: 1 mm, max: 10 cm}");
   yaml = Replaced(yaml, "    silo_width: 10 cm\n", "");
-  const ReadOutcome outcome =
-      ReadCampaign(yaml, "c.yaml", ReaderOf({{"silo.csv", "opening,mass_flow_rate\n30,0.5\n"}}));
+  const ReadOutcome outcome = ReadCampaign(
+      methods::All(), yaml, "c.yaml", ReaderOf({{"silo.csv", "opening,mass_flow_rate\n30,0.5\n"}}));
   ASSERT_EQ(outcome.problems.size(), 1U);
   EXPECT_THAT(ToString(outcome.problems[0]),
               HasSubstr("parameters.silo_width: makes outlet impossible at 0.001 m, an end of its "
@@ -192,9 +193,10 @@ TEST(CalibratedSettings, MayHaveANormalPriorWithoutBounds) {
 TEST(CalibratedSettings, OfWhatADerivedCampaignHasNotChangeNothing) {
   const std::string yaml =
       WithLines("  tx05.confining_pressure: {prior: uniform, min: 0.4 MPa, max: 0.6 MPa}\n");
-  const auto derived = Derive(yaml, {.name = "sand + cell",
-                                     .lineage = {.parent = "c1", .purpose = "extension"},
-                                     .held_out = false});
+  const auto derived = Derive(methods::All(), yaml,
+                              {.name = "sand + cell",
+                               .lineage = {.parent = "c1", .purpose = "extension"},
+                               .held_out = false});
   ASSERT_TRUE(derived.ok());
   const Campaign c = ReadGood(*derived);
   ASSERT_EQ(c.experiments.size(), 1U);
@@ -221,16 +223,17 @@ TEST(CalibratedSettings, OfAPredictedTestStayAsStated) {
                                               "packing.void_ratio"));
   YamlAt(experiment, "as_stated") =
       YamlList({YamlScalar("confining_pressure"), YamlScalar("packing.void_ratio")});
-  const auto derived = Derive(yaml, {.name = "prediction",
-                                     .lineage = {.parent = "c1", .purpose = "prediction"},
-                                     .experiments = {experiment},
-                                     .rows = {{.like = 0,
-                                               .values = {{"young_modulus", 1e9},
-                                                          {"friction_angle", 0.5},
-                                                          {"rolling_resistance.stiffness", 0.3},
-                                                          {"rolling_resistance.friction", 0.4},
-                                                          {"confining_pressure", 5e5},
-                                                          {"packing.void_ratio", 0.65}}}}});
+  const auto derived = Derive(methods::All(), yaml,
+                              {.name = "prediction",
+                               .lineage = {.parent = "c1", .purpose = "prediction"},
+                               .experiments = {experiment},
+                               .rows = {{.like = 0,
+                                         .values = {{"young_modulus", 1e9},
+                                                    {"friction_angle", 0.5},
+                                                    {"rolling_resistance.stiffness", 0.3},
+                                                    {"rolling_resistance.friction", 0.4},
+                                                    {"confining_pressure", 5e5},
+                                                    {"packing.void_ratio", 0.65}}}}});
   ASSERT_TRUE(derived.ok());
   const Campaign c = ReadGood(*derived);
   const RunOf run = RunWith({5e5, 0.65});

@@ -6,6 +6,7 @@
 
 #include "server/campaign/file/derive.h"
 #include "server/campaign/model/race.h"
+#include "server/methods/registry.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -36,7 +37,8 @@ const std::string kEqual =
     "  twisting_resistance.friction: {equal_to: \"0.5 * rolling_resistance.friction\"}\n";
 
 Campaign ReadTied(const std::string& yaml, CampaignIs is = CampaignIs::kNew) {
-  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()), std::nullopt, is);
+  const ReadOutcome outcome =
+      ReadCampaign(methods::All(), yaml, "c.yaml", ReaderOf(GoodFiles()), std::nullopt, is);
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   return outcome.campaign;
 }
@@ -74,19 +76,19 @@ TEST(TiedParameters, MayFollowFromFixedAndTiedOnesInAnyOrder) {
 
 TEST(TiedParameters, StayInWhatIsDerived) {
   const std::string parent = WithTwisting(kEqual);
-  const auto extension =
-      Derive(parent, {.name = "sand + adhesion",
-                      .lineage = {.parent = "c1", .purpose = "extension"},
-                      .effects = {"adhesion_jkr"},
-                      .parameters = {{"adhesion_jkr.work_of_adhesion",
-                                      {.kind = "log_uniform", .min = 1e-3, .max = 1}}}});
+  const auto extension = Derive(methods::All(), parent,
+                                {.name = "sand + adhesion",
+                                 .lineage = {.parent = "c1", .purpose = "extension"},
+                                 .effects = {"adhesion_jkr"},
+                                 .parameters = {{"adhesion_jkr.work_of_adhesion",
+                                                 {.kind = "log_uniform", .min = 1e-3, .max = 1}}}});
   ASSERT_TRUE(extension.ok());
   const Campaign extended = ReadTied(*extension);
   EXPECT_EQ(extended.tied.size(), 2U);
   EXPECT_EQ(extended.parameters.size(), 5U);
 
   const auto design = Derive(
-      parent,
+      methods::All(), parent,
       {.name = "design",
        .lineage = {.parent = "c1", .purpose = "design"},
        .parameters = {{"load_cell_error.gain", {.kind = "uniform", .min = -0.3, .max = 0.3}}},

@@ -8,11 +8,13 @@
 #include <filesystem>
 #include <fstream>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 #include "tests/support/small_campaign.h"
 #include "worker/engine/evaluate.h"
 #include "worker/program/process_tree.h"
@@ -35,10 +37,11 @@ class EnginesOfAWorker : public ::testing::Test {
   explicit EnginesOfAWorker(int load_steps = 6)
       : campaign_(calib::testing::MakeSmallCampaign({.load_steps = load_steps})),
         scratch_(::testing::TempDir() + "engines" + std::to_string(getpid())) {
-    const auto outcome = campaign::ReadCampaign(
-        campaign_.yaml, "c.yaml", [this](const std::string& path) -> absl::StatusOr<std::string> {
-          return campaign_.files.at(path);
-        });
+    const auto outcome =
+        campaign::ReadCampaign(methods::All(), campaign_.yaml, "c.yaml",
+                               [this](const std::string& path) -> absl::StatusOr<std::string> {
+                                 return campaign_.files.at(path);
+                               });
     EXPECT_TRUE(outcome.problems.empty());
     *lease_.mutable_spec() = messages::SpecOf(outcome.campaign, 0, {{2e8, 0.5}, 0});
     lease_.set_attempt(1);
@@ -71,9 +74,20 @@ class EnginesOfAWorker : public ::testing::Test {
             .grace = std::chrono::milliseconds(300)};
   }
 
+  /// Whose first engine stands still as soon as it asks for its specimen.
+  EnginesOptions Stopping() {
+    EnginesOptions options = Options();
+    options.fetch = [this](const std::string& digest, std::stop_token /*stop*/) {
+      if (!std::exchange(has_stopped_, true)) kill(Children().front(), SIGSTOP);
+      return ContentOf(digest);
+    };
+    return options;
+  }
+
   const calib::testing::SmallCampaign campaign_;
   const std::string scratch_;
   v1::Lease lease_;
+  bool has_stopped_ = false;
 };
 
 TEST_F(EnginesOfAWorker, GiveTheBitsThatTheMechanicsGiveHere) {
@@ -148,12 +162,11 @@ TEST_F(EnginesOfAWorker, ThatDiedWhileItWaitedIsReplaced) {
 
 // Less than any engine has.
 TEST_F(EnginesOfAWorker, ThatTakeMoreMemoryThanTheyMayAreKilledAlone) {
-  Engines engines(Options());
+  Engines engines(Stopping());
   const auto ignore = [](const v1::State& /*state*/) {};
   v1::Lease small = lease_;
   small.mutable_limits()->set_memory(1e6);
-  const auto ended = engines.Evaluate(
-      small, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  const auto ended = engines.Evaluate(small, ignore, {});
   EXPECT_EQ(ended.outcome(), v1::Finished::OUTCOME_MODEL_FAILED);
   EXPECT_NE(ended.reason().find("the engine came to its memory limit: "), std::string::npos)
       << ended.reason();
@@ -163,19 +176,20 @@ TEST_F(EnginesOfAWorker, ThatTakeMoreMemoryThanTheyMayAreKilledAlone) {
 }
 
 TEST_F(EnginesOfAWorker, ThatHangAreKilledAlone) {
-  Engines engines(Options());
+  Engines engines(Stopping());
+  const auto ignore = [](const v1::State& /*state*/) {};
   v1::Lease lease = lease_;
   lease.mutable_limits()->set_silence(0.5);
-  const auto hangs = engines.Evaluate(
-      lease, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  const auto hangs = engines.Evaluate(lease, ignore, {});
   EXPECT_EQ(hangs.outcome(), v1::Finished::OUTCOME_MODEL_FAILED);
   EXPECT_NE(hangs.reason().find("the engine came to its silence limit: no state for 0.5 s, after"),
             std::string::npos)
       << hangs.reason();
+  EXPECT_EQ(engines.Evaluate(lease_, ignore, {}).outcome(), v1::Finished::OUTCOME_COMPLETED);
+  kill(Children().front(), SIGSTOP);
   lease.mutable_limits()->clear_silence();
   lease.mutable_limits()->set_wall(0.5);
-  const auto endless = engines.Evaluate(
-      lease, [](const v1::State& /*state*/) { kill(Children().front(), SIGSTOP); }, {});
+  const auto endless = engines.Evaluate(lease, ignore, {});
   EXPECT_NE(endless.reason().find("the engine came to its wall limit of 0.5 s, after"),
             std::string::npos)
       << endless.reason();

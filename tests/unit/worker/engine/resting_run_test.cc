@@ -9,6 +9,7 @@
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
+#include "server/methods/registry.h"
 #include "tests/support/small_campaign.h"
 #include "worker/engine/evaluate.h"
 
@@ -28,10 +29,11 @@ class RestingRun : public ::testing::Test {
           }
           return absl::NotFoundError(digest);
         }) {
-    const auto outcome = campaign::ReadCampaign(
-        campaign_.yaml, "c.yaml", [this](const std::string& path) -> absl::StatusOr<std::string> {
-          return campaign_.files.at(path);
-        });
+    const auto outcome =
+        campaign::ReadCampaign(methods::All(), campaign_.yaml, "c.yaml",
+                               [this](const std::string& path) -> absl::StatusOr<std::string> {
+                                 return campaign_.files.at(path);
+                               });
     EXPECT_TRUE(outcome.problems.empty());
     spec_ = messages::SpecOf(outcome.campaign, 0, {{2e8, 0.5}, 0});
     std::filesystem::remove_all(folder_);

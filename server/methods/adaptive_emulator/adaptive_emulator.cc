@@ -1,0 +1,127 @@
+#include "server/methods/adaptive_emulator/adaptive_emulator.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/file/shared/map_reader.h"
+#include "server/campaign/model/campaign.h"
+#include "server/methods/adaptive_emulator/adaptive_planner.h"
+
+namespace calib::methods {
+namespace {
+
+constexpr int kMostRuns = 10'000;
+constexpr const char* kMaxRuns = "max_runs";
+constexpr const char* kBatch = "batch";
+
+class AdaptiveEmulator final : public campaign::Method {
+ public:
+  std::string name() const override { return "adaptive_emulator"; }
+  bool keeps_batches() const override { return true; }
+  bool needs_errors() const override { return true; }
+  bool bounds_runs() const override { return false; }        // it would take a bound for a value
+  int standard_iterations() const override { return 0; }
+  bool takes_first_proposal() const override { return false; }  // first runs fill the prior
+
+  bool batches_vary() const override { return true; }
+
+  int FirstBatch(const campaign::Campaign& campaign) const override {
+    return inference::FirstRunsOf(static_cast<Eigen::Index>(campaign.parameters.size()), options_);
+  }
+  std::string RunsInWords(const campaign::Campaign& campaign) const override {
+    return absl::StrCat(FirstBatch(campaign), " runs that fill the prior, then batches of ",
+                        options_.batch, ", at most ", options_.max_runs, " runs in all");
+  }
+  int LaterBatch(const campaign::Campaign& /*campaign*/) const override {
+    return std::max(options_.batch, options_.verify);
+  }
+  int MostBatches(const campaign::Campaign& campaign) const override {
+    const int later = options_.max_runs - FirstBatch(campaign);
+    return 1 + std::max(0, later + options_.batch - 1) / options_.batch + 1;
+  }
+
+  std::vector<campaign::Section> Keys() const override {
+    const inference::AdaptiveOptions standard;
+    return {{"inference",
+             "inference",
+             {
+                 {kMaxRuns, campaign::Whole(1, kMostRuns), absl::StrCat(standard.max_runs),
+                  "adaptive_emulator: runs at most, of all batches together"},
+                 {kBatch, campaign::AnyOf({campaign::Whole(1, 1000), campaign::OneWord({"auto"})}),
+                  absl::StrCat("auto: ", standard.batch),
+                  "adaptive_emulator: runs that are chosen together"},
+             }}};
+  }
+
+  std::shared_ptr<const campaign::Method> Read(campaign::MapReader& inference,
+                                               campaign::Campaign& campaign) const override {
+    auto read = std::make_shared<AdaptiveEmulator>();
+    inference::AdaptiveOptions& options = read->options_;
+    options.max_runs = static_cast<int>(inference.Integer(kMaxRuns).value_or(options.max_runs));
+    const campaign::YamlNode* batch = inference.Find(kBatch);
+    const bool is_auto = batch == nullptr || (batch->kind == campaign::YamlNode::Kind::kScalar &&
+                                              batch->scalar == "auto");
+    if (!is_auto) {
+      options.batch = static_cast<int>(inference.Integer(kBatch).value_or(options.batch));
+    }
+    for (const char* key : {"samples", "max_iterations"}) {
+      if (inference.Has(key)) {
+        inference.Problem(
+            key, absl::StrCat("is chosen by ", name(), "; ", kMaxRuns, " bounds its runs"));
+      }
+    }
+    if (campaign.filter.noise != inference::NoiseMode::kGiven) {
+      inference.Problem("method", absl::StrCat(name(),
+                                               " needs the errors of the readings as they are; "
+                                               "write noise: given, or take tmcmc"));
+    }
+    // The largest batch is the first, which the parameters decide.
+    campaign.samples = options.max_runs;
+    // Its runs are spread over the packings, so that it knows what these differ by.
+    if (!campaign.replicates) campaign.replicates = 0;
+    return read;
+  }
+
+  void Check(const campaign::MapReader& inference,
+             const campaign::Campaign& campaign) const override {
+    const auto parameters = static_cast<Eigen::Index>(campaign.parameters.size());
+    const int least = inference::LeastMaxRuns(parameters, options_);
+    if (parameters > 0 && options_.max_runs < least) {
+      inference.Problem(
+          kMaxRuns,
+          absl::StrCat("is ", options_.max_runs, ", and ", parameters, " parameters take ", least,
+                       " runs at least: ", inference::FirstRunsOf(parameters, options_),
+                       " that fill the prior, two batches of ", options_.batch, " and ",
+                       options_.verify, " that judge"));
+    }
+  }
+
+  campaign::MethodInWords InWords(const campaign::Campaign& /*campaign*/,
+                                  int iterations) const override {
+    return {
+        "Runs placed one batch after the other where an emulator of those before leaves the "
+        "posterior least certain",
+        {"Sinsbeck M, Nowak W (2017) Sequential design of computer experiments for the "
+         "solution of Bayesian inverse problems. SIAM/ASA J Uncertain Quantif 5:640–664",
+         "Järvenpää M, Gutmann MU, Vehtari A, Marttinen P (2021) Parallel Gaussian process "
+         "surrogate Bayesian inference with noisy likelihood evaluations. Bayesian Anal "
+         "16:147–178"},
+        absl::StrCat(", ", iterations, " batches")};
+  }
+
+  std::unique_ptr<planning::Planner> MakePlanner(
+      const planning::Definition& definition) const override {
+    return MakeAdaptivePlanner(definition, options_);
+  }
+
+ private:
+  inference::AdaptiveOptions options_;  // max_runs and batch
+};
+
+}  // namespace
+
+std::shared_ptr<const campaign::Method> MakeAdaptiveEmulator() {
+  return std::make_shared<AdaptiveEmulator>();
+}
+
+}  // namespace calib::methods

@@ -1,0 +1,290 @@
+#include "server/methods/adaptive_emulator/adaptive_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "calib/return_if_error.h"
+#include "inference/data/data_set.h"
+#include "inference/diagnosis/stage_projection.h"
+#include "inference/filter/parameter_summary.h"
+#include "inference/numerics/weighted_moments.h"
+#include "server/campaign/model/word_table.h"
+#include "server/planning/posterior_record.h"
+#include "server/planning/scatter.h"
+
+namespace calib::methods {
+namespace {
+
+using campaign::Word;
+using Eigen::Index;
+using inference::AdaptiveStage;
+using Json = nlohmann::json;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// sd by which the means of two emulators of the same runs may differ: twice what
+/// AdaptiveOptions::mean_error lets one be off.
+constexpr double kMayDiffer = 0.3;
+
+constexpr std::array kStageWords = {
+    Word{AdaptiveStage::kFirst, "first"},
+    Word{AdaptiveStage::kSearching, "searching"},
+    Word{AdaptiveStage::kVerifying, "verifying"},
+    Word{AdaptiveStage::kConverged, "converged"},
+    Word{AdaptiveStage::kRefused, "refused"},
+    Word{AdaptiveStage::kNotConverged, "not_converged"},
+};
+
+/// The readings of a campaign as its coordinates: matrix * readings in `order`.
+struct Coordinates {
+  std::vector<Index> order;  ///< T, of the data's readings: curve after curve
+  Eigen::MatrixXd matrix;    ///< q x T
+};
+
+/// One curve for each observable of each experiment.
+Coordinates CoordinatesOf(const planning::Definition& definition) {
+  std::map<std::pair<int, int>, std::vector<Index>> readings;
+  for (std::size_t k = 0; k < definition.data.readings.size(); ++k) {
+    const inference::Reading& reading = definition.data.readings[k];
+    readings[{reading.experiment, reading.observable}].push_back(static_cast<Index>(k));
+  }
+  Coordinates result;
+  std::vector<inference::PathCurve> curves;
+  for (const auto& [of, rows] : readings) {
+    const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(of.first)];
+    inference::PathCurve& curve = curves.emplace_back();
+    curve.path.resize(static_cast<Index>(rows.size()));
+    std::map<std::string, int> stages;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto& reading = definition.data.readings[static_cast<std::size_t>(rows[i])];
+      const auto step = static_cast<std::size_t>(reading.load_step);
+      const std::string stage = step < experiment.segment.size() ? experiment.segment[step] : "";
+      curve.stage.push_back(stages.emplace(stage, static_cast<int>(stages.size())).first->second);
+      curve.path[static_cast<Index>(i)] = reading.control;
+      result.order.push_back(rows[i]);
+    }
+  }
+  result.matrix = inference::ProjectStages(curves).matrix;
+  return result;
+}
+
+/// q coordinates of a history; not a number where readings that one needs are.
+Eigen::VectorXd Of(const Coordinates& coordinates, const Eigen::RowVectorXd& history) {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(coordinates.matrix.rows());
+  for (Index m = 0; m < result.size(); ++m) {
+    for (Index t = 0; t < coordinates.matrix.cols(); ++t) {
+      const double weight = coordinates.matrix(m, t);
+      if (weight != 0)
+        result[m] += weight * history[coordinates.order[static_cast<std::size_t>(t)]];
+    }
+  }
+  return result;
+}
+
+Json ToJson(const Eigen::VectorXd& values) {
+  return std::vector<double>(values.begin(), values.end());
+}
+
+Eigen::VectorXd ToVector(const Json& values) {
+  const auto numbers = values.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Index>(numbers.size()));
+}
+
+struct Memory {
+  inference::AdaptiveMemory of_decision;
+  double expected_gain = 0;
+};
+
+std::string ToText(const Memory& memory) {
+  return Json{{"stage", campaign::WordOf(kStageWords, memory.of_decision.stage)},
+              {"mean", ToJson(memory.of_decision.mean)},
+              {"sd", ToJson(memory.of_decision.sd)},
+              {"expected_gain", memory.expected_gain}}
+      .dump();
+}
+
+absl::StatusOr<Memory> FromText(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    const auto stage = campaign::ValueOf(kStageWords, json.at("stage").get<std::string>());
+    if (!stage) return absl::DataLossError("a stored batch is of a stage that nobody knows");
+    return Memory{{*stage, ToVector(json.at("mean")), ToVector(json.at("sd"))},
+                  json.at("expected_gain").get<double>()};
+  } catch (const Json::exception& error) {
+    return absl::DataLossError(absl::StrCat("stored batch: ", error.what()));
+  }
+}
+
+class AdaptivePlanner final : public planning::Planner {
+ public:
+  AdaptivePlanner(const planning::Definition& definition, const inference::AdaptiveOptions& options)
+      : definition_(definition),
+        campaign_(definition.campaign),
+        options_(options),
+        coordinates_(CoordinatesOf(definition)) {
+    options_.seed = campaign_.seed;
+    for (const campaign::CalibratedParameter& p : campaign_.parameters) {
+      options_.names.push_back(p.name);
+    }
+    problem_.prior = definition.priors;
+    Eigen::RowVectorXd measured(static_cast<Index>(definition.data.readings.size()));
+    for (Index k = 0; k < measured.size(); ++k) {
+      measured[k] = definition.data.readings[static_cast<std::size_t>(k)].value;
+    }
+    problem_.measured = Of(coordinates_, measured);
+    const Eigen::MatrixXd errors = inference::ErrorCovariance(definition.data);
+    problem_.noise = coordinates_.matrix * errors(coordinates_.order, coordinates_.order) *
+                     coordinates_.matrix.transpose();
+    problem_.share = planning::LargestScatterShare(campaign_);
+    problem_.packings =
+        static_cast<int>(std::max<std::size_t>(1, campaign::PackingsOfAll(campaign_)));
+  }
+
+  absl::StatusOr<planning::Batch> First() const override {
+    ASSIGN_OR_RETURN(const auto decision, inference::DecideAdaptive(problem_, {}, {}, options_));
+    if (decision.stage == AdaptiveStage::kRefused) {
+      return absl::FailedPreconditionError(decision.reason);
+    }
+    return BatchOf(decision, 0, 0);
+  }
+
+  absl::StatusOr<planning::Outcome> Conclude(const planning::History& history,
+                                             bool affordable) const override {
+    std::vector<Memory> memories;
+    for (const std::string& proposal : history.proposals) {
+      ASSIGN_OR_RETURN(auto memory, FromText(proposal));
+      memories.push_back(std::move(memory));
+    }
+    std::vector<inference::AdaptiveMemory> earlier;
+    for (const Memory& memory : memories) earlier.push_back(memory.of_decision);
+    const inference::AdaptiveRuns runs = RunsOf(history);
+    ASSIGN_OR_RETURN(const auto decision,
+                     inference::DecideAdaptive(problem_, runs, earlier, options_));
+    if (decision.stage == AdaptiveStage::kRefused) {
+      return absl::FailedPreconditionError(decision.reason);
+    }
+    planning::Outcome outcome{
+        .answer = Means(history, *decision.posterior),
+        .converged = false,
+        .log = absl::StrCat(runs.rows(), " runs, ", campaign::WordOf(kStageWords, decision.stage)),
+        .next = {}};
+    for (std::size_t k = 0; k < memories.size(); ++k) {
+      outcome.answer.batches.push_back(
+          {.runs = static_cast<int>(history.iterations[k].parameters.rows()),
+           .expected_gain = memories[k].expected_gain});
+    }
+    const bool goes_on = decision.next.parameters.rows() > 0;
+    if (goes_on && affordable) {
+      outcome.next = BatchOf(decision, static_cast<int>(history.iterations.size()),
+                             static_cast<int>(runs.rows()));
+      return outcome;
+    }
+    if (!decision.reason.empty()) outcome.answer.warnings.push_back(decision.reason);
+    planning::AskEmulator(definition_, history.iterations, outcome.answer);
+    outcome.converged = decision.stage == AdaptiveStage::kConverged &&
+                        outcome.answer.FromEmulator() && Agree(*decision.posterior, outcome.answer);
+    return outcome;
+  }
+
+ private:
+  /// iteration: its number; made: runs before it.
+  planning::Batch BatchOf(const inference::AdaptiveDecision& decision, int iteration,
+                          int made) const {
+    planning::Batch batch{
+        .proposal =
+            ToText({.of_decision = {decision.stage, decision.memory.mean, decision.memory.sd},
+                    .expected_gain = iteration == 0 ? 0 : decision.next.expected_gain}),
+        .parameters = decision.next.parameters,
+        .stop_below = std::vector<double>(decision.next.packing.size(), store::kUnknown),
+        .refused = {}};
+    for (const int packing : decision.next.packing) {
+      batch.streams.push_back(problem_.packings * made++ + packing);
+    }
+    return batch;
+  }
+
+  inference::AdaptiveRuns RunsOf(const planning::History& history) const {
+    Index rows = 0;
+    for (const inference::Iteration& batch : history.iterations) rows += batch.parameters.rows();
+    inference::AdaptiveRuns runs;
+    runs.parameters.resize(rows, static_cast<Index>(problem_.prior.size()));
+    runs.coordinates.resize(rows, problem_.measured.size());
+    Index row = 0;
+    for (std::size_t k = 0; k < history.iterations.size(); ++k) {
+      const inference::Iteration& batch = history.iterations[k];
+      for (Index i = 0; i < batch.parameters.rows(); ++i, ++row) {
+        const store::SampleRecord& sample = history.samples[static_cast<std::size_t>(row)];
+        runs.parameters.row(row) = batch.parameters.row(i);
+        runs.packing.push_back(sample.stream.value_or(0) % problem_.packings);
+        runs.batch.push_back(static_cast<int>(k));
+        const bool complete = batch.predictions.row(i).allFinite();
+        runs.coordinates.row(row) =
+            Of(coordinates_, complete ? batch.predictions.row(i) : history.stopped[k].row(i));
+        runs.end.push_back(complete                                   ? inference::RunEnd::kComplete
+                           : history.unknown.count(sample.sample) > 0 ? inference::RunEnd::kUnknown
+                           : runs.coordinates.row(row).array().isFinite().any()
+                               ? inference::RunEnd::kEarly
+                               : inference::RunEnd::kDiverged);
+      }
+    }
+    return runs;
+  }
+
+  /// What is known while the search goes on: where the posterior lies, and no widths.
+  planning::Answer Means(const planning::History& history,
+                         const inference::AdaptivePosterior& posterior) const {
+    planning::Answer answer;
+    inference::Posterior& weighted = answer.weighted;
+    weighted.log_weights =
+        Eigen::VectorXd::Constant(static_cast<Index>(history.samples.size()), -kInfinity);
+    weighted.log_weights[0] = 0;
+    for (std::size_t j = 0; j < problem_.prior.size(); ++j) {
+      weighted.parameters.push_back(inference::Summarize(
+          problem_.prior[j], posterior.log_weights, posterior.draws.col(static_cast<Index>(j))));
+    }
+    answer.weighted_members =
+        planning::SummarizeMembers(campaign_, posterior.draws, posterior.log_weights);
+    weighted.log_evidence = weighted.log_evidence_se = weighted.pareto_k = planning::kNone;
+    weighted.ess = 1;
+    weighted.degeneracy =
+        "Runs were placed where the posterior was least certain and are no draws of it.";
+    return answer;
+  }
+
+  /// Whether the two emulators give one posterior; tells where they do not.
+  bool Agree(const inference::AdaptivePosterior& own, planning::Answer& answer) const {
+    const Eigen::MatrixXd standard =
+        inference::StandardRows(problem_.prior, answer.emulated->draws);
+    const Eigen::RowVectorXd mean = standard.colwise().mean();
+    bool agree = true;
+    for (Index j = 0; j < mean.size(); ++j) {
+      const double apart = std::abs(mean[j] - own.mean[j]) / own.sd[j];
+      if (apart <= kMayDiffer) continue;
+      agree = false;
+      answer.warnings.push_back(absl::StrFormat(
+          "Two emulators of these runs differ by %.2f sd in the mean of %s: not converged.", apart,
+          options_.names[static_cast<std::size_t>(j)]));
+    }
+    return agree;
+  }
+
+  const planning::Definition& definition_;
+  const campaign::Campaign& campaign_;
+  inference::AdaptiveOptions options_;
+  Coordinates coordinates_;
+  inference::AdaptiveProblem problem_;
+};
+
+}  // namespace
+
+std::unique_ptr<planning::Planner> MakeAdaptivePlanner(const planning::Definition& definition,
+                                                       const inference::AdaptiveOptions& options) {
+  return std::make_unique<AdaptivePlanner>(definition, options);
+}
+
+}  // namespace calib::methods

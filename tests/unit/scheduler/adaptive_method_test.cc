@@ -1,0 +1,103 @@
+// adaptive_emulator through the scheduler: what it runs, when it ends, and that its bits are the
+// same whatever goes wrong. Its numbers are held by tests/verification/inference/adaptive.
+#include <gmock/gmock.h>
+
+#include "server/planning/posterior_record.h"
+#include "tests/unit/scheduler/simulated_service.h"
+
+namespace calib::scheduler {
+namespace {
+
+using ::testing::HasSubstr;
+
+testing::SmallCampaign AdaptiveCampaignOf(const std::string& inference, int packings = 1) {
+  return testing::MakeSmallCampaign({.samples = 0,
+                                     .load_steps = 12,
+                                     .failure_attempts = 100,
+                                     .relative_noise = 0.02,
+                                     .packings = packings,
+                                     .method = "adaptive_emulator",
+                                     .inference = inference});
+}
+
+v1::Posterior PosteriorAtTheEnd(SimulatedService& service) {
+  v1::Posterior last;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior.has_value()) last = *planning::PosteriorFromJson(*iteration.posterior);
+  }
+  return last;
+}
+
+TEST(AdaptiveCampaign, PlacesBatchesUntilThePosteriorIsKnown) {
+  SimulatedService service("adaptive");
+  service.Submit(AdaptiveCampaignOf("  max_runs: 80\n"));
+  service.RunToEnd(1, true);
+  const auto progress = Value(service.Read().Campaign(1)).progress;
+  EXPECT_EQ(progress.state, store::CampaignState::kFinished) << progress.reason;
+  EXPECT_TRUE(progress.converged) << PosteriorAtTheEnd(service).warnings(0);
+  const v1::Posterior posterior = PosteriorAtTheEnd(service);
+  EXPECT_EQ(posterior.posterior_from(), "emulator");
+  ASSERT_GE(posterior.batches_size(), 4) << "first, two that settle, one that judges";
+  EXPECT_EQ(posterior.batches(0).runs(), 20) << "ten for each parameter";
+  int runs = 0;
+  for (const auto& batch : posterior.batches()) {
+    runs += batch.runs();
+    EXPECT_GE(batch.expected_gain(), 0);
+    EXPECT_LE(batch.expected_gain(), 1);
+  }
+  EXPECT_LE(runs, 80);
+  EXPECT_GT(posterior.batches(1).expected_gain(), posterior.batches(3).expected_gain());
+  for (const auto& parameter : posterior.parameters()) EXPECT_GT(parameter.sd(), 0);
+}
+
+TEST(AdaptiveCampaign, SpreadsItsRunsOverThePackings) {
+  SimulatedService service("adaptive_packings");
+  service.Submit(AdaptiveCampaignOf("  max_runs: 60\n  batch: 4\n", 4));
+  service.RunToEnd(1, true);
+  std::vector<int> runs(4, 0);
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    ASSERT_TRUE(sample.stream.has_value());
+    ++runs[static_cast<std::size_t>(*sample.stream % 4)];
+  }
+  const auto [fewest, most] = std::minmax_element(runs.begin(), runs.end());
+  EXPECT_LE(*most - *fewest, 4) << "the repeats of the first batch apart they are balanced";
+}
+
+TEST(AdaptiveCampaign, SameBitsWhateverGoesWrong) {
+  const auto campaign = AdaptiveCampaignOf("  max_runs: 44\n");
+  SimulatedService calm("adaptive_calm");
+  calm.Submit(campaign);
+  calm.RunToEnd(1, true);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService storm("adaptive_storm");
+    storm.Submit(campaign);
+    storm.RunToEnd(seed, false);
+    EXPECT_EQ(storm.Fingerprint(), calm.Fingerprint()) << seed;
+  }
+}
+
+std::string FirstProblemOf(const testing::SmallCampaign& c) {
+  const auto read = [&c](const std::string& path) -> absl::StatusOr<std::string> {
+    const auto found = c.files.find(path);
+    return found != c.files.end() ? absl::StatusOr<std::string>(found->second)
+                                  : absl::NotFoundError(path);
+  };
+  const auto outcome = campaign::ReadCampaign(methods::All(), c.yaml, "c.yaml", read);
+  return outcome.problems.empty() ? "" : campaign::ToString(outcome.problems.front());
+}
+
+TEST(AdaptiveCampaign, BadInputIsOneSentence) {
+  EXPECT_EQ(FirstProblemOf(AdaptiveCampaignOf("  batch: auto\n")), "");
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  max_runs: 20\n")),
+              HasSubstr("max_runs: is 20, and 2 parameters take 38 runs at least: 20 that fill the "
+                        "prior, two batches of 6 and 6 that judge"));
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  samples: 50\n")),
+              HasSubstr("samples: is chosen by adaptive_emulator; max_runs bounds its runs"));
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  batch: many\n")), HasSubstr("batch: "));
+  auto inferred = AdaptiveCampaignOf("");
+  inferred.yaml.replace(inferred.yaml.find("noise: given"), 12, "noise: inferred");
+  EXPECT_THAT(FirstProblemOf(inferred), HasSubstr("needs the errors of the readings as they are"));
+}
+
+}  // namespace
+}  // namespace calib::scheduler
