@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/parameter_summary.h"
+#include "server/planning/json_vectors.h"
 #include "server/planning/stage_misfit.h"
 
 namespace calib::planning {
@@ -239,15 +240,6 @@ void AddScatter(const Definition& definition, const Answer& answer, v1::Posterio
 
 using Json = nlohmann::json;
 
-Json ToJson(const Eigen::VectorXd& values) {
-  return Json(std::vector<double>(values.data(), values.data() + values.size()));
-}
-
-Eigen::VectorXd ToVector(const Json& json) {
-  const auto values = json.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
 }  // namespace
 
 v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int iteration,
@@ -335,8 +327,8 @@ std::string ProposalToJson(const inference::Proposal& proposal) {
   }
   for (const auto& component : proposal.components) {
     json["components"].push_back({{"weight", component.weight},
-                                  {"mean", ToJson(component.mean)},
-                                  {"covariance", ToJson(component.covariance.reshaped())}});
+                                  {"mean", VectorToJson(component.mean)},
+                                  {"covariance", VectorToJson(component.covariance.reshaped())}});
   }
   return json.dump();
 }
@@ -354,9 +346,9 @@ absl::StatusOr<inference::Proposal> ProposalFromJson(const std::string& text) {
     for (const Json& item : json.at("components")) {
       inference::Proposal::Component component;
       component.weight = item.at("weight").get<double>();
-      component.mean = ToVector(item.at("mean"));
+      component.mean = VectorFromJson(item.at("mean"));
       const Eigen::Index d = component.mean.size();
-      component.covariance = ToVector(item.at("covariance")).reshaped(d, d);
+      component.covariance = VectorFromJson(item.at("covariance")).reshaped(d, d);
       proposal.components.push_back(std::move(component));
     }
     return proposal;

@@ -96,7 +96,7 @@ class Scheduler {
   /// by half a lease the server has stood still, and nothing ends for a lease time from then.
   void Tick();
 
-  // ---- campaigns (scheduler.cc) ----
+  // ---- campaigns (scheduler_commands.cc, scheduler_plans.cc) ----
   /// Stores and starts a campaign that was read without problems. Its id is chosen here ("c1"),
   /// given to `reply` and remembered as the answer to the request (request.answer is ignored; an
   /// empty request_id is not remembered). RESOURCE_EXHAUSTED: as many campaigns are not over as the
@@ -240,7 +240,7 @@ class Scheduler {
   void Grow(const planning::NewRuns& runs, const GrowthReply& reply);
   void WriteGrowth(std::int64_t campaign, const planning::Growth& growth, const GrowthReply& reply);
 
-  // Campaigns (scheduler.cc)
+  // Campaigns (scheduler.cc, scheduler_plans.cc)
   /// RESOURCE_EXHAUSTED when as many campaigns are not over as the server takes.
   absl::Status WhyNoMore() const;
   void TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<CampaignRun>> loaded);
@@ -275,6 +275,8 @@ class Scheduler {
   /// the run that ended now did.
   static std::string TooManyDiverged(CampaignRun& run, const std::string& last);
   /// Changes the state, writes it after `also`, then replies.
+  /// Whether it is worth trying again in a moment.
+  static bool MayPass(const absl::Status& error);
   /// Of a campaign that this program cannot read: its state in the store alone.
   void SetUnreadable(std::int64_t campaign, CampaignState state, const std::string& reason,
                      const store::Store::Job& also, const Reply& reply);

@@ -13,13 +13,14 @@ namespace {
 constexpr int kMostRuns = 10'000;
 constexpr const char* kMaxRuns = "max_runs";
 constexpr const char* kBatch = "batch";
+constexpr const char* kAsynchronous = "asynchronous";
 
 class AdaptiveEmulator final : public campaign::Method {
  public:
   std::string name() const override { return "adaptive_emulator"; }
   bool keeps_batches() const override { return true; }
   bool needs_errors() const override { return true; }
-  bool bounds_runs() const override { return false; }        // it would take a bound for a value
+  bool bounds_runs() const override { return false; }  // it would take a bound for a value
   int standard_iterations() const override { return 0; }
   bool takes_first_proposal() const override { return false; }  // first runs fill the prior
 
@@ -37,7 +38,8 @@ class AdaptiveEmulator final : public campaign::Method {
   }
   int MostBatches(const campaign::Campaign& campaign) const override {
     const int later = options_.max_runs - FirstBatch(campaign);
-    return 1 + std::max(0, later + options_.batch - 1) / options_.batch + 1;
+    const int least = std::min(options_.batch, options_.verify);
+    return 1 + (std::max(0, later) + least - 1) / least;
   }
 
   std::vector<campaign::Section> Keys() const override {
@@ -50,6 +52,8 @@ class AdaptiveEmulator final : public campaign::Method {
                  {kBatch, campaign::AnyOf({campaign::Whole(1, 1000), campaign::OneWord({"auto"})}),
                   absl::StrCat("auto: ", standard.batch),
                   "adaptive_emulator: runs that are chosen together"},
+                 {kAsynchronous, campaign::TrueOrFalse(), "false",
+                  "adaptive_emulator: false, decisions are taken on complete batches"},
              }}};
   }
 
@@ -63,6 +67,10 @@ class AdaptiveEmulator final : public campaign::Method {
                                               batch->scalar == "auto");
     if (!is_auto) {
       options.batch = static_cast<int>(inference.Integer(kBatch).value_or(options.batch));
+    }
+    if (inference.TrueOrFalse(kAsynchronous).value_or(false)) {
+      inference.Problem(kAsynchronous,
+                        "cannot be true: this build decides on complete batches alone");
     }
     for (const char* key : {"samples", "max_iterations"}) {
       if (inference.Has(key)) {

@@ -15,7 +15,7 @@
 #include "inference/filter/parameter_summary.h"
 #include "inference/numerics/weighted_moments.h"
 #include "server/campaign/model/word_table.h"
-#include "server/planning/posterior_record.h"
+#include "server/planning/json_vectors.h"
 #include "server/planning/scatter.h"
 
 namespace calib::methods {
@@ -47,7 +47,7 @@ struct Coordinates {
 };
 
 /// One curve for each observable of each experiment.
-Coordinates CoordinatesOf(const planning::Definition& definition) {
+Coordinates MakeCoordinates(const planning::Definition& definition) {
   std::map<std::pair<int, int>, std::vector<Index>> readings;
   for (std::size_t k = 0; k < definition.data.readings.size(); ++k) {
     const inference::Reading& reading = definition.data.readings[k];
@@ -74,7 +74,7 @@ Coordinates CoordinatesOf(const planning::Definition& definition) {
 }
 
 /// q coordinates of a history; not a number where readings that one needs are.
-Eigen::VectorXd Of(const Coordinates& coordinates, const Eigen::RowVectorXd& history) {
+Eigen::VectorXd Project(const Coordinates& coordinates, const Eigen::RowVectorXd& history) {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(coordinates.matrix.rows());
   for (Index m = 0; m < result.size(); ++m) {
     for (Index t = 0; t < coordinates.matrix.cols(); ++t) {
@@ -86,15 +86,6 @@ Eigen::VectorXd Of(const Coordinates& coordinates, const Eigen::RowVectorXd& his
   return result;
 }
 
-Json ToJson(const Eigen::VectorXd& values) {
-  return std::vector<double>(values.begin(), values.end());
-}
-
-Eigen::VectorXd ToVector(const Json& values) {
-  const auto numbers = values.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Index>(numbers.size()));
-}
-
 struct Memory {
   inference::AdaptiveMemory of_decision;
   double expected_gain = 0;
@@ -102,8 +93,8 @@ struct Memory {
 
 std::string ToText(const Memory& memory) {
   return Json{{"stage", campaign::WordOf(kStageWords, memory.of_decision.stage)},
-              {"mean", ToJson(memory.of_decision.mean)},
-              {"sd", ToJson(memory.of_decision.sd)},
+              {"mean", planning::VectorToJson(memory.of_decision.mean)},
+              {"sd", planning::VectorToJson(memory.of_decision.sd)},
               {"expected_gain", memory.expected_gain}}
       .dump();
 }
@@ -113,7 +104,8 @@ absl::StatusOr<Memory> FromText(const std::string& text) {
     const Json json = Json::parse(text);
     const auto stage = campaign::ValueOf(kStageWords, json.at("stage").get<std::string>());
     if (!stage) return absl::DataLossError("a stored batch is of a stage that nobody knows");
-    return Memory{{*stage, ToVector(json.at("mean")), ToVector(json.at("sd"))},
+    return Memory{{*stage, planning::VectorFromJson(json.at("mean")),
+                   planning::VectorFromJson(json.at("sd"))},
                   json.at("expected_gain").get<double>()};
   } catch (const Json::exception& error) {
     return absl::DataLossError(absl::StrCat("stored batch: ", error.what()));
@@ -126,7 +118,7 @@ class AdaptivePlanner final : public planning::Planner {
       : definition_(definition),
         campaign_(definition.campaign),
         options_(options),
-        coordinates_(CoordinatesOf(definition)) {
+        coordinates_(MakeCoordinates(definition)) {
     options_.seed = campaign_.seed;
     for (const campaign::CalibratedParameter& p : campaign_.parameters) {
       options_.names.push_back(p.name);
@@ -136,7 +128,7 @@ class AdaptivePlanner final : public planning::Planner {
     for (Index k = 0; k < measured.size(); ++k) {
       measured[k] = definition.data.readings[static_cast<std::size_t>(k)].value;
     }
-    problem_.measured = Of(coordinates_, measured);
+    problem_.measured = Project(coordinates_, measured);
     const Eigen::MatrixXd errors = inference::ErrorCovariance(definition.data);
     problem_.noise = coordinates_.matrix * errors(coordinates_.order, coordinates_.order) *
                      coordinates_.matrix.transpose();
@@ -168,8 +160,9 @@ class AdaptivePlanner final : public planning::Planner {
     if (decision.stage == AdaptiveStage::kRefused) {
       return absl::FailedPreconditionError(decision.reason);
     }
+    ASSIGN_OR_RETURN(auto answer, BestRunAndMeans(history, *decision.posterior));
     planning::Outcome outcome{
-        .answer = Means(history, *decision.posterior),
+        .answer = std::move(answer),
         .converged = false,
         .log = absl::StrCat(runs.rows(), " runs, ", campaign::WordOf(kStageWords, decision.stage)),
         .next = {}};
@@ -224,7 +217,7 @@ class AdaptivePlanner final : public planning::Planner {
         runs.batch.push_back(static_cast<int>(k));
         const bool complete = batch.predictions.row(i).allFinite();
         runs.coordinates.row(row) =
-            Of(coordinates_, complete ? batch.predictions.row(i) : history.stopped[k].row(i));
+            Project(coordinates_, complete ? batch.predictions.row(i) : history.stopped[k].row(i));
         runs.end.push_back(complete                                   ? inference::RunEnd::kComplete
                            : history.unknown.count(sample.sample) > 0 ? inference::RunEnd::kUnknown
                            : runs.coordinates.row(row).array().isFinite().any()
@@ -235,14 +228,22 @@ class AdaptivePlanner final : public planning::Planner {
     return runs;
   }
 
-  /// What is known while the search goes on: where the posterior lies, and no widths.
-  planning::Answer Means(const planning::History& history,
-                         const inference::AdaptivePosterior& posterior) const {
+  /// What is known without widths: the most likely run, and where the posterior lies.
+  absl::StatusOr<planning::Answer> BestRunAndMeans(
+      const planning::History& history, const inference::AdaptivePosterior& posterior) const {
+    ASSIGN_OR_RETURN(const auto batches, planning::LogLikelihoodsByBatch(definition_, history));
+    Eigen::VectorXd likelihood(static_cast<Index>(history.samples.size()));
+    Index row = 0;
+    for (const Eigen::VectorXd& batch : batches) {
+      likelihood.segment(row, batch.size()) = batch;
+      row += batch.size();
+    }
+    Index best = 0;
+    likelihood.maxCoeff(&best);
     planning::Answer answer;
     inference::Posterior& weighted = answer.weighted;
-    weighted.log_weights =
-        Eigen::VectorXd::Constant(static_cast<Index>(history.samples.size()), -kInfinity);
-    weighted.log_weights[0] = 0;
+    weighted.log_weights = Eigen::VectorXd::Constant(likelihood.size(), -kInfinity);
+    weighted.log_weights[best] = 0;
     for (std::size_t j = 0; j < problem_.prior.size(); ++j) {
       weighted.parameters.push_back(inference::Summarize(
           problem_.prior[j], posterior.log_weights, posterior.draws.col(static_cast<Index>(j))));

@@ -47,6 +47,13 @@ TEST(AdaptiveCampaign, PlacesBatchesUntilThePosteriorIsKnown) {
   }
   EXPECT_LE(runs, 80);
   EXPECT_GT(posterior.batches(1).expected_gain(), posterior.batches(3).expected_gain());
+  double best = -std::numeric_limits<double>::infinity();
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    best = std::max(best, sample.log_likelihood);
+  }
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    EXPECT_EQ(sample.log_weight == 0, sample.log_likelihood == best) << "the best run alone";
+  }
   for (const auto& parameter : posterior.parameters()) EXPECT_GT(parameter.sd(), 0);
 }
 
@@ -94,6 +101,9 @@ TEST(AdaptiveCampaign, BadInputIsOneSentence) {
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  samples: 50\n")),
               HasSubstr("samples: is chosen by adaptive_emulator; max_runs bounds its runs"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  batch: many\n")), HasSubstr("batch: "));
+  EXPECT_EQ(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: false\n")), "");
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: true\n")),
+              HasSubstr("asynchronous: cannot be true: this build decides on complete batches"));
   auto inferred = AdaptiveCampaignOf("");
   inferred.yaml.replace(inferred.yaml.find("noise: given"), 12, "noise: inferred");
   EXPECT_THAT(FirstProblemOf(inferred), HasSubstr("needs the errors of the readings as they are"));
