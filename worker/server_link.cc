@@ -220,9 +220,11 @@ absl::Status Insist(const std::stop_token& stop, int most_refusals,
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
     absl::Status status = call(context);
     refusals += absl::IsResourceExhausted(status) ? 1 : 0;
-    if (status.ok() || stop.stop_requested() || !rpc::IsRetryable(status.code()) ||
-        refusals >= most_refusals)
+    // Cancelled without a stop: by a server that ends.
+    const bool may_change = rpc::IsRetryable(status.code()) || absl::IsCancelled(status);
+    if (status.ok() || stop.stop_requested() || !may_change || refusals >= most_refusals) {
       return status;
+    }
     std::mutex mutex;
     std::unique_lock<std::mutex> lock(mutex);
     std::condition_variable_any().wait_for(lock, stop, backoff.Next(), [] { return false; });

@@ -227,7 +227,7 @@ TEST(ProgramModel, RunsThatGoWrongAreTakenForWhatTheyAre) {
       RunLine(deployment,
               MakeLine({.samples = 150,
                         .iterations = 1,
-                        .model = "  limits: {silence: 2 s, memory: 2 GB, wall: 60 s}\n",
+                        .model = "  limits: {silence: 6 s, memory: 2 GB, wall: 60 s}\n",
                         .settings = "{faults: true}",
                         .extra = "failure: {attempts: 2, pause_above: 0.5}\n"}),
               "faults");

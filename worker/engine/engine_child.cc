@@ -9,8 +9,10 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <map>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -97,7 +99,8 @@ class EngineChild {
         break;
       case v1::EngineOrder::kContent: {
         const absl::MutexLock lock(&mutex_);
-        content_ = std::move(*order.mutable_content());
+        std::string digest = order.content().digest();
+        contents_.emplace(std::move(digest), std::move(*order.mutable_content()));
         changed_.SignalAll();
         break;
       }
@@ -135,20 +138,18 @@ class EngineChild {
     });
     v1::EngineWord word;
     word.set_wants(digest);
-    {
-      const absl::MutexLock lock(&mutex_);
-      content_.reset();
-    }
     Say(word);
     const absl::MutexLock lock(&mutex_);
-    while (!content_.has_value() && !stop.stop_requested() && !input_ended_) {
+    while (!contents_.contains(digest) && !stop.stop_requested() && !input_ended_) {
       changed_.Wait(&mutex_);
     }
-    if (!content_.has_value()) return absl::CancelledError("stopped");
-    if (content_->error() != 0) {
-      return absl::Status(static_cast<absl::StatusCode>(content_->error()), content_->message());
+    const auto answer = contents_.extract(digest);
+    if (answer.empty()) return absl::CancelledError("stopped");
+    v1::EngineContent& content = answer.mapped();
+    if (content.error() != 0) {
+      return absl::Status(static_cast<absl::StatusCode>(content.error()), content.message());
     }
-    return std::move(*content_->mutable_content());
+    return std::move(*content.mutable_content());
   }
 
   /// A worker that has gone takes this process with it.
@@ -167,7 +168,8 @@ class EngineChild {
   const SharedContent shared_;
   absl::Mutex mutex_;
   absl::CondVar changed_;
-  std::optional<v1::EngineContent> content_ ABSL_GUARDED_BY(mutex_);
+  /// By digest; each answers one that asked.
+  std::multimap<std::string, v1::EngineContent> contents_ ABSL_GUARDED_BY(mutex_);
   bool input_ended_ ABSL_GUARDED_BY(mutex_) = false;
   Specimens specimens_;
   std::optional<Checkpoints> checkpoints_;

@@ -103,6 +103,7 @@ class Engines::Talk {
       case v1::EngineWord::kWants: {
         const auto asked = Clock::now();
         v1::EngineOrder order;
+        order.mutable_content()->set_digest(word.wants());
         if (auto content = options_.fetch(word.wants(), stop_); content.ok()) {
           order.mutable_content()->set_content(*std::move(content));
         } else {
@@ -115,6 +116,10 @@ class Engines::Talk {
       }
       case v1::EngineWord::kFinished:
         finished_ = std::move(*word.mutable_finished());
+        // A stop that nobody asked for would be taken for a node that goes down.
+        if (finished_->outcome() == v1::Finished::OUTCOME_STOPPED && !IsUnwanted()) {
+          finished_->set_outcome(v1::Finished::OUTCOME_FAILED);
+        }
         break;
       case v1::EngineWord::WORD_NOT_SET:
         break;

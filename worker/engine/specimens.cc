@@ -46,6 +46,18 @@ absl::StatusOr<std::shared_ptr<const Specimen>> Specimens::Get(const v1::Attempt
     changed_.SignalAll();
   });
   absl::MutexLock lock(&mutex_);
+  while (true) {
+    const std::shared_ptr<Entry> entry = Begun(spec);
+    while (!entry->ready && !stop.stop_requested()) {
+      changed_.Wait(&mutex_);
+    }
+    if (!entry->ready) return absl::CancelledError("stopped");
+    // A making that ended with the run it was begun for is begun again for this one.
+    if (!absl::IsCancelled(entry->result.status()) || stop.stop_requested()) return entry->result;
+  }
+}
+
+std::shared_ptr<Specimens::Entry> Specimens::Begun(const v1::AttemptSpec& spec) {
   std::shared_ptr<Entry>& slot = entries_[KeyOf(spec)];
   // A recipe that leads to no packing never does.
   const auto transient = [](const Entry& entry) {
@@ -63,11 +75,7 @@ absl::StatusOr<std::shared_ptr<const Specimen>> Specimens::Get(const v1::Attempt
       changed_.SignalAll();
     });
   }
-  const std::shared_ptr<Entry> entry = slot;
-  while (!entry->ready && !stop.stop_requested()) {
-    changed_.Wait(&mutex_);
-  }
-  return entry->ready ? entry->result : Result(absl::CancelledError("stopped"));
+  return slot;
 }
 
 absl::StatusOr<dem::Packing> Specimens::Generate(const v1::AttemptSpec& spec,

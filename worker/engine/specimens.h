@@ -49,6 +49,8 @@ class Specimens {
     std::jthread maker{};
   };
 
+  /// What is made of a spec, or its making, begun where there is none.
+  std::shared_ptr<Entry> Begun(const v1::AttemptSpec& spec) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<dem::Packing> Generate(const v1::AttemptSpec& spec, std::stop_token stop) const;
   Result Make(const v1::AttemptSpec& spec, std::stop_token stop) const;
 

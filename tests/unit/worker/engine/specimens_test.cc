@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <future>
 #include <thread>
 
 #include "dem/model/state.h"
@@ -71,6 +72,28 @@ TEST(Specimens, FailureIsNotRemembered) {
   });
   EXPECT_FALSE(specimens.Get(Named("a"), {}).ok());
   EXPECT_TRUE(specimens.Get(Named("a"), {}).ok());
+}
+
+// The fetch goes by the run that began it; the one that waits beside still wants the specimen.
+TEST(Specimens, StoppedByOneItIsMadeAgainForAnother) {
+  std::atomic<int> fetches = 0;
+  std::promise<void> both_wait;
+  Specimens specimens([&](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
+    if (++fetches > 1) return kText;
+    both_wait.get_future().wait();
+    return absl::CancelledError("CANCELLED");
+  });
+  std::jthread stopped([&](const std::stop_token& stop) {
+    EXPECT_EQ(specimens.Get(Named("a"), stop).status().code(), absl::StatusCode::kCancelled);
+  });
+  while (fetches == 0) std::this_thread::yield();
+  stopped.request_stop();
+  stopped.join();
+  auto other = std::async(std::launch::async, [&] { return specimens.Get(Named("a"), {}); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // it waits, most likely
+  both_wait.set_value();
+  EXPECT_TRUE(other.get().ok());
+  EXPECT_EQ(fetches, 2);
 }
 
 // Another attempt would end the same way: neither the node's fault nor worth the time.
