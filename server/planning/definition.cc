@@ -87,13 +87,18 @@ std::vector<int> Definition::ExperimentsOf(campaign::Role role) const {
 }
 
 campaign::FileReader StoredFiles(store::Reader& reader,
-                                 const std::map<std::string, std::string>& files) {
-  return [&reader, files](const std::string& path) -> absl::StatusOr<std::string> {
+                                 const std::map<std::string, std::string>& files,
+                                 absl::Status* unread) {
+  return [&reader, files, unread](const std::string& path) -> absl::StatusOr<std::string> {
     const auto found = files.find(path);
     if (found == files.end()) {
       return absl::NotFoundError(absl::StrCat("file ", path, " was not submitted"));
     }
-    return reader.Blob(found->second);
+    auto content = reader.Blob(found->second);
+    if (unread != nullptr && !content.ok() && !absl::IsNotFound(content.status())) {
+      unread->Update(content.status());
+    }
+    return content;
   };
 }
 
@@ -119,9 +124,11 @@ absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
     const campaign::MethodList& methods, store::Reader& reader,
     const store::NewCampaign& submitted) {
   ASSIGN_OR_RETURN(const auto files, reader.Files(submitted.id));
+  absl::Status unread;
   campaign::ReadOutcome outcome = campaign::ReadCampaign(
-      methods, submitted.yaml, submitted.file_name, StoredFiles(reader, files), submitted.seed,
-      campaign::StoredUnder(submitted.reading_rules));
+      methods, submitted.yaml, submitted.file_name, StoredFiles(reader, files, &unread),
+      submitted.seed, campaign::StoredUnder(submitted.reading_rules));
+  RETURN_IF_ERROR(unread);
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this program refuses the campaign as submitted: ",

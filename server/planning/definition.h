@@ -62,9 +62,11 @@ struct Definition {
   std::vector<int> ExperimentsOf(campaign::Role role) const;
 };
 
-/// Reads files by their digests in `files` (path -> digest) from the store.
+/// Reads files by their digests in `files` (path -> digest) from the store. unread: becomes the
+/// first error of the store itself, which is no fault of the campaign's and may pass; may be null.
 campaign::FileReader StoredFiles(store::Reader& reader,
-                                 const std::map<std::string, std::string>& files);
+                                 const std::map<std::string, std::string>& files,
+                                 absl::Status* unread = nullptr);
 
 /// What a stored sample is run with.
 campaign::RunOf ToRun(const campaign::Campaign& campaign, const store::SampleRecord& sample);

@@ -126,10 +126,12 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
   if (request.has_seed()) {
     seed = request.seed();
   }
-  const campaign::ReadOutcome outcome =
-      campaign::ReadCampaign(methods::All(), request.campaign_file(), request.file_name(),
-                             planning::StoredFiles(reader, files), seed, campaign::CampaignIs::kNew,
-                             {.covariance = static_cast<std::size_t>(limits.covariance)});
+  absl::Status unread;
+  const campaign::ReadOutcome outcome = campaign::ReadCampaign(
+      methods::All(), request.campaign_file(), request.file_name(),
+      planning::StoredFiles(reader, files, &unread), seed, campaign::CampaignIs::kNew,
+      {.covariance = static_cast<std::size_t>(limits.covariance)});
+  RETURN_IF_ERROR(unread);
   if (!outcome.problems.empty()) {
     return Refused(outcome.problems);
   }
