@@ -12,6 +12,7 @@
 #include "server/planning/definition.h"
 #include "server/service/submission.h"
 #include "server/store/store.h"
+#include "tests/simulation/faults.h"
 
 namespace calib::simulation {
 namespace {
@@ -22,6 +23,14 @@ TEST(Simulation, ASeedGivesTheSameEventsAgain) {
   EXPECT_GT(once.events, 100);
   EXPECT_EQ(once.digest, again.digest);
   EXPECT_NE(once.digest, Simulate({.seed = 4}).digest);
+}
+
+TEST(Simulation, FindsWhatIsPlantedInDiskAndQueues) {
+  for (const Fault& fault : Faults()) {
+    if (fault.in_scheduler) continue;
+    EXPECT_NE(Simulate({.seed = fault.seed, .fault = fault.name}).violation, "") << fault.name;
+    EXPECT_EQ(Simulate({.seed = fault.seed}).violation, "") << fault.name;
+  }
 }
 
 // Each read of the disk in turn fails.
