@@ -49,13 +49,15 @@ absl::Status Scheduler::Load() {
                            .owner = run == nullptr ? "" : run->record().submitted.owner,
                            .shared = SharedDigest(attempt.key),
                            .started = ports_.Now()};
-    if (run == nullptr) {
-      GiveBack(lease, {}, AttemptOutcome::kLost, false);
+    if (run == nullptr) {  // over, or to be read again: nobody's loss
+      GiveBack(lease, Because(attempt.id, "its campaign did not run when the server started"),
+               AttemptOutcome::kStopped, false);
     } else {
       Hold(lease);
     }
   }
   for (auto& [id, run] : runs_) {
+    ReturnUnleased(*run);  // given back by a server that could not read the campaign
     PauseIfOfOtherMechanics(*run);
     TakeFromOthers(*run);
     Enqueue(*run);

@@ -144,6 +144,22 @@ TEST(CampaignLife, WorkerKeepsItsAttemptAcrossARestartOfTheServer) {
   EXPECT_TRUE(service.Next(after, Kind::kAck).ack().finished());
 }
 
+// A server that cannot read a campaign gives back its attempts, and may end before it has read it.
+TEST(CampaignLife, WhatRunsByTheStoreAndByNoAttemptIsLeasedByTheNextServer) {
+  SimulatedService service("unleased");
+  service.Submit(Small());
+  const std::int64_t before = service.Connect("w", 1);
+  const v1::Lease lease = service.Next(before, Kind::kLease).lease();
+  service.Write([&](store::Transaction& t) {
+    t.EndAttempt({.id = lease.attempt(), .outcome = store::AttemptOutcome::kStopped});
+  });
+  service.Restart();
+  const std::int64_t after = service.Connect("w", 1, {lease.attempt()});
+  EXPECT_TRUE(service.Next(after, Kind::kAck).ack().refused());
+  const v1::Lease again = service.Next(after, Kind::kLease).lease();
+  EXPECT_GT(again.attempt(), lease.attempt());
+}
+
 TEST(CampaignLife, LeavingWorkerGivesBackWhatIsOnItsWayToIt) {
   SimulatedService service("leaving");
   service.Submit(Small());
