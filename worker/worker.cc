@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "dem/registry/catalog.h"
+#include "proto/calib/v1/protocol.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/check_message.h"
 #include "proto/rpc/client_options.h"
@@ -119,6 +120,8 @@ class Worker::Impl {
     hello.set_cpu(rpc::Fitted(v1::NAME, options_.cpu));
     for (const std::string& name : programs_.AllowedNames()) hello.add_programs(name);
     hello.set_checkpoints(checkpoints_);
+    hello.set_protocol(kProtocol);
+    hello.add_features(kLimitsRuns);
     for (auto& [id, attempt] : held_) {
       hello.add_attempts(id);
       attempt.StreamLost();
@@ -250,7 +253,14 @@ class Worker::Impl {
   }
 
   void Welcome(const v1::Welcome& welcome) {
+    if (const absl::Status status = CheckProtocol("the server", welcome.protocol(), "this worker");
+        !status.ok()) {
+      link_.FinishSending();
+      Closed(status);
+      return;
+    }
     spdlog::info("connected server={} held={}", options_.server, held_.size());
+    if (!welcome.waits().empty()) spdlog::warn("waits reason=\"{}\"", welcome.waits());
     welcome_ = true;
     said_why_ = false;
     backoff_.Reset();

@@ -106,8 +106,8 @@ Check JudgeBuild(const std::string& subject, const Build& own, const Build& othe
   check.health = Health::kProblem;
   check.found = absl::StrCat(InWords(other), "; this calibctl has ", InWords(own), ".");
   check.advice =
-      "Install one build on server and nodes: others would compute other bits, and a server turns "
-      "such workers away.";
+      "Install one build on server and nodes: others would compute other bits, and a server gives "
+      "such workers no runs of the DEM.";
   return check;
 }
 
@@ -330,6 +330,13 @@ std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
   for (const v1::WorkerInfo& worker : workers) {
     if (worker.connected()) {
       slots += worker.slots();
+      if (!worker.waits().empty()) {
+        checks.push_back({.name = "workers",
+                          .subject = worker.name(),
+                          .health = Health::kWarning,
+                          .found = absl::StrCat("It has ", worker.waits(), "."),
+                          .advice = "Install one build on server and nodes."});
+      }
       continue;
     }
     if (worker.left()) continue;

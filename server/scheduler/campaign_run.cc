@@ -6,6 +6,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/model/sha256.h"
 #include "server/messages/attempt_spec.h"
 #include "server/planning/decisions.h"
 #include "server/planning/early_stopping.h"
@@ -24,6 +26,12 @@ bool IsForGood(EvaluationStatus status) {
 }
 
 }  // namespace
+
+const std::string& OwnMechanics() {
+  static const std::string own =
+      WorkerTable::Mechanics(dem::EngineVersion(), campaign::Sha256Hex(dem::CatalogText()));
+  return own;
+}
 
 CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const planning::Definition> definition)
     : id_(id), definition_(std::move(definition)) {
@@ -309,11 +317,18 @@ void CampaignRun::Planned(bool again) {
   planned_ = again ? std::nullopt : std::optional<std::size_t>(Results());
 }
 
+bool CampaignRun::NeedsLimits() const {
+  const campaign::Resources& needs = definition_->campaign.resources;
+  return !definition_->campaign.program && (needs.memory || needs.wall || needs.silence);
+}
+
 int CampaignRun::SlotsOf(const WorkerTable::Kind& kind) const {
-  if (!MayBeRunBy(kind.programs)) {
+  const campaign::Resources& needs = definition_->campaign.resources;
+  if (!MayBeRunBy(kind.programs) ||
+      (!definition_->campaign.program && kind.mechanics != OwnMechanics()) ||
+      (NeedsLimits() && !kind.limits_runs)) {
     return 0;
   }
-  const campaign::Resources& needs = definition_->campaign.resources;
   const double threads = needs.threads.value_or(1);
   double slots = std::max(1.0, std::ceil(threads * kind.slots / kind.threads));
   if (needs.memory.has_value() && kind.memory > 0) {

@@ -56,6 +56,9 @@ class MissingSteps {
   std::size_t count_ = 0;
 };
 
+/// The DEM of this build, as WorkerTable::Mechanics. Thread-safe.
+const std::string& OwnMechanics();
+
 /// Not thread-safe.
 class CampaignRun {
  public:
@@ -130,8 +133,11 @@ class CampaignRun {
     });
   }
   /// Slots that a run holds of such a worker, the fewest whose threads and memory are together what
-  /// it needs; 0: it has not as many, or may not run the campaign's program.
+  /// it needs; 0: it has not as many, may not run the campaign's program, has another DEM than the
+  /// server (runs of programs need none), or would not hold a run to its limits.
   int SlotsOf(const WorkerTable::Kind& kind) const;
+  /// Whether its runs are of the DEM and have limits of their own.
+  bool NeedsLimits() const;
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
   std::string Refusal(const store::EvaluationKey& key, int load_step,
                       std::span<const double> observables) const;

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
+#include "proto/calib/v1/protocol.h"
 #include "server/campaign/model/sha256.h"
 #include "server/scheduler/scheduler.h"
 
@@ -34,6 +35,18 @@ absl::Status TooManyAttempts(const v1::Hello& hello, int attempts) {
                                                        " slots can hold"));
 }
 
+/// Why a worker gets no runs of the DEM; empty: it does.
+std::string WhyWaits(const v1::Hello& hello) {
+  if (hello.engine_version() != dem::EngineVersion()) {
+    return absl::StrCat("mechanics version ", hello.engine_version(), ", the server has ",
+                        dem::EngineVersion(), ": waits until both are of one build");
+  }
+  if (hello.catalog_digest() != campaign::Sha256Hex(dem::CatalogText())) {
+    return "other contacts, effects or tests than the server: waits until both are of one build";
+  }
+  return "";
+}
+
 }  // namespace
 
 absl::Status Scheduler::Admit(const v1::Hello& hello) const {
@@ -45,15 +58,10 @@ absl::Status Scheduler::Admit(const v1::Hello& hello) const {
   if (absl::Status status = TooManyAttempts(hello, hello.attempts_size()); !status.ok()) {
     return status;
   }
-  if (hello.engine_version() != dem::EngineVersion()) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("worker ", hello.name(), " has mechanics version ", hello.engine_version(),
-                     ", the server ", dem::EngineVersion(), ": update the node"));
-  }
-  if (hello.catalog_digest() != campaign::Sha256Hex(dem::CatalogText())) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("worker ", hello.name(),
-                     " offers other contacts, effects or tests than the server: update the node"));
+  if (absl::Status status =
+          CheckProtocol(absl::StrCat("worker ", hello.name()), hello.protocol(), "the server");
+      !status.ok()) {
+    return status;
   }
   const Clock::time_point now = ports_.Now();
   if (workers_.IsAnother(hello, leases_.HeardSince(now))) {
@@ -91,6 +99,8 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
   welcome.mutable_welcome()->set_gather_ms(
       static_cast<int>(std::min(options_.gather, options_.heartbeat).count()));
+  welcome.mutable_welcome()->set_protocol(kProtocol);
+  welcome.mutable_welcome()->set_waits(WhyWaits(hello));
   ports_.Send(session, std::move(welcome));
   if (workers_.Find(hello.name())->draining) {  // it may have missed the message
     SendDrain(*workers_.Find(hello.name()));
@@ -115,11 +125,16 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   return absl::OkStatus();
 }
 
-// Those that are known from the store alone, or it has come back with other slots.
+// Those that are known from the store alone, or it has come back with other slots, as another
+// build, or may no longer run what it has run.
 void Scheduler::FitSlots(const v1::Hello& hello) {
   for (const LeaseEntry& lease : leases_.OfWorker(hello.name())) {
-    const int slots = std::max(1, FindRun(lease.key.campaign)->SlotsOf(WorkerTable::KindOf(hello)));
-    if (slots != lease.slots) {
+    const int slots = FindRun(lease.key.campaign)->SlotsOf(WorkerTable::KindOf(hello));
+    if (slots == 0) {
+      Release(lease.attempt);
+      GiveBack(lease, Because(lease.attempt, "the worker came back as one that may not run it"),
+               AttemptOutcome::kLost, true);
+    } else if (slots != lease.slots) {
       shares_.Return(HoldingOf(lease));
       leases_.Resize(lease.attempt, slots);
       shares_.Take(HoldingOf(*leases_.Find(lease.attempt, hello.name())));
@@ -284,6 +299,7 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
     info.set_threads(entry.hello.threads_per_slot());
     info.set_memory(entry.hello.memory());
     info.set_user(entry.hello.user());
+    info.set_waits(WhyWaits(entry.hello));
     info.set_left(entry.leaving && entry.session == 0);
     info.set_seconds_since_heard(std::chrono::duration<double>(ports_.Now() - entry.heard).count());
     for (const LeaseEntry& lease : leases_.OfWorker(name)) {

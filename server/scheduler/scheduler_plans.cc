@@ -87,19 +87,19 @@ std::string Scheduler::WhyNobodyMay(const CampaignRun& run) const {
   const campaign::Resources& needs = campaign.resources;
   const std::string& owner = run.record().submitted.owner;
   const std::optional<int> quota = shares_.Quota(owner);
-  if (!campaign.program && !needs.threads && !needs.memory && quota != 0) {
-    return "";
-  }
   int connected = 0;
-  int allowed = 0;
-  int fewest = 0;  // slots of a run; 0: no worker has as many
+  int allowed = 0;  // to run its program
+  int alike = 0;    // with the server's DEM
+  int fewest = 0;   // slots of a run; 0: no worker has as many
   for (const auto& [name, worker] : workers_.all()) {
     if (worker.session == 0) continue;
     ++connected;
     const WorkerTable::Kind kind = WorkerTable::KindOf(worker.hello);
     allowed += run.MayBeRunBy(kind.programs) ? 1 : 0;
+    alike += kind.mechanics == OwnMechanics() ? 1 : 0;
     const int slots = run.SlotsOf(kind);
     if (slots > 0 && (fewest == 0 || slots < fewest)) fewest = slots;
+    if (fewest == 1) break;  // none may be had for less
   }
   if (quota.has_value() && *quota < std::max(1, fewest)) {
     return absl::StrCat("the quota of ", owner, " is ", *quota,
@@ -121,6 +121,16 @@ std::string Scheduler::WhyNobodyMay(const CampaignRun& run) const {
   }
   if (connected == 0) {
     return "";
+  }
+  if (!campaign.program && alike == 0) {
+    return absl::StrCat(
+        "none of ", connected, connected == 1 ? " connected worker" : " connected workers",
+        " has the server's mechanics: `calibctl workers --json` says why each waits");
+  }
+  if (run.NeedsLimits() && !needs.threads && !needs.memory) {
+    return absl::StrCat("none of ", connected,
+                        " connected workers is of a build that holds a run "
+                        "to wall and silence of resources: update the nodes");
   }
   std::vector<std::string> wanted;
   if (needs.threads) wanted.push_back(absl::StrCat(*needs.threads, " threads"));

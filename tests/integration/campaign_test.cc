@@ -181,18 +181,22 @@ TEST(Worker, OfAnotherBuildIsToldToUpdate) {
   ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
   v1::Hello hello = MatchingHello("old", 1);
   hello.set_engine_version("0");
-  FakeWorker worker(deployment.address(), hello);
-  EXPECT_FALSE(worker.Receive(kLong).has_value());
-  EXPECT_EQ(worker.Finish().code(), absl::StatusCode::kFailedPrecondition);
   Client client = deployment.client();
-  const auto report = client.Examine();
-  ASSERT_TRUE(report.ok()) << report.status();
-  ASSERT_EQ(report->refused_size(), 1);
-  EXPECT_EQ(report->refused(0).name(), "old");
-  EXPECT_NE(report->refused(0).reason().find("mechanics version 0"), std::string::npos);
+  {
+    FakeWorker worker(deployment.address(), hello);
+    const auto welcome = worker.Receive(kLong);
+    ASSERT_TRUE(welcome.has_value());
+    EXPECT_NE(welcome->welcome().waits().find("mechanics version 0"), std::string::npos);
+    const auto listed = client.Workers();
+    ASSERT_TRUE(listed.ok()) << listed.status();
+    ASSERT_EQ(listed->workers_size(), 1);
+    EXPECT_EQ(listed->workers(0).waits(), welcome->welcome().waits());
+    EXPECT_EQ(client.Examine()->refused_size(), 0) << "it waits";
+  }
   FakeWorker updated(deployment.address(), MatchingHello("old", 1));
-  EXPECT_TRUE(updated.Receive(kLong).has_value());
-  EXPECT_EQ(client.Examine()->refused_size(), 0) << "it has come back";
+  const auto welcome = updated.Receive(kLong);
+  ASSERT_TRUE(welcome.has_value());
+  EXPECT_EQ(welcome->welcome().waits(), "");
 }
 
 TEST(Worker, UnderANameThatIsTakenIsToldToTakeAnother) {

@@ -11,6 +11,7 @@
 #include "calib/v1/campaign.grpc.pb.h"
 #include "calib/v1/worker.grpc.pb.h"
 #include "dem/registry/catalog.h"
+#include "proto/calib/v1/protocol.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"
@@ -265,6 +266,8 @@ v1::Hello MatchingHello(const std::string& name, int slots) {
   hello.set_threads_per_slot(1);
   hello.set_engine_version(dem::EngineVersion());
   hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
+  hello.set_protocol(kProtocol);
+  hello.add_features(kLimitsRuns);
   return hello;
 }
 

@@ -15,6 +15,7 @@ std::string State(const v1::WorkerInfo& w) {
   const std::string since = report::Duration(w.seconds_since_heard());
   if (w.left()) return (w.draining() ? "drained " : "left ") + since + " ago";
   if (!w.connected()) return "silent for " + since;
+  if (!w.waits().empty()) return w.waits();
   return w.draining() ? "draining" : "ready";
 }
 

@@ -449,6 +449,7 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
          {"draining", w.draining()},
          {"connected", w.connected()},
          {"left", w.left()},
+         {"waits", w.waits().empty() ? Json(nullptr) : Json(w.waits())},
          {"seconds_since_heard", w.seconds_since_heard()},
          {"running", running},
          {"engine_version", w.engine_version()}});

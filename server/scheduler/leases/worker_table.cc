@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <tuple>
 
+#include "absl/strings/str_cat.h"
+#include "proto/calib/v1/protocol.h"
+
 namespace calib::scheduler {
 namespace {
 
@@ -24,7 +27,14 @@ WorkerTable::Kind WorkerTable::KindOf(const v1::Hello& hello) {
           .slots = hello.slots(),
           .threads = hello.threads() > 0 ? hello.threads()
                                          : hello.slots() * std::max(1, hello.threads_per_slot()),
-          .memory = hello.memory()};
+          .memory = hello.memory(),
+          .mechanics = Mechanics(hello.engine_version(), hello.catalog_digest()),
+          .limits_runs = std::find(hello.features().begin(), hello.features().end(), kLimitsRuns) !=
+                         hello.features().end()};
+}
+
+std::string WorkerTable::Mechanics(const std::string& version, const std::string& catalog_digest) {
+  return absl::StrCat(version, " ", catalog_digest);
 }
 
 bool WorkerTable::Freer::operator()(const WorkerEntry* a, const WorkerEntry* b) const {

@@ -34,11 +34,15 @@ class WorkerTable {
   struct Kind {
     std::vector<std::string> programs{};  ///< Hello::programs
     int slots = 0;
-    int threads = 1;    ///< of all slots
-    double memory = 0;  ///< of all slots [bytes]; 0: not told
+    int threads = 1;           ///< of all slots
+    double memory = 0;         ///< of all slots [bytes]; 0: not told
+    std::string mechanics{};   ///< version and catalogue of its DEM
+    bool limits_runs = false;  ///< kLimitsRuns (proto/calib/v1/protocol.h)
     friend auto operator<=>(const Kind&, const Kind&) = default;
   };
   static Kind KindOf(const v1::Hello& hello);
+  /// Of a DEM, to be compared: others give other bits.
+  static std::string Mechanics(const std::string& version, const std::string& catalog_digest);
   /// Slots that a run would hold of such a worker, > 0; 0: it may not have it.
   using Needs = std::function<int(const Kind&)>;
   /// Who is passed over, by name.

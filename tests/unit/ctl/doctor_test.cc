@@ -170,7 +170,7 @@ TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {
   silent.set_seconds_since_heard(90);
   v1::RefusedWorker& refused = *server.add_refused();
   refused.set_name("node3-1");
-  refused.set_reason("worker node3-1 has mechanics version 6, the server 7: update the node");
+  refused.set_reason("worker node3-1 speaks protocol 1, the server from 2 on: update it");
   refused.set_unix_ms(970'000);
   v1::WorkerInfo drained;
   drained.set_name("node4-1");
@@ -180,7 +180,7 @@ TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {
   EXPECT_EQ(checks[0].found, "2 slots of connected workers.");
   EXPECT_EQ(checks[1].health, Health::kWarning);
   EXPECT_EQ(checks[2].health, Health::kProblem);
-  EXPECT_THAT(checks[2].found, HasSubstr("30 s ago: worker node3-1 has mechanics version 6"));
+  EXPECT_THAT(checks[2].found, HasSubstr("30 s ago: worker node3-1 speaks protocol 1"));
 }
 
 TEST(Doctor, TrialRunsAreHeldAgainstHertz) {

@@ -2,10 +2,18 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
+#include <random>
+#include <thread>
 
+#include "absl/strings/str_cat.h"
 #include "server/store/connection.h"
 #include "server/store/store.h"
 
@@ -145,6 +153,70 @@ TEST(Migrations, WithoutACopyNothingIsChanged) {
       << refused;
   EXPECT_EQ(SchemaOf(path), 2);
   EXPECT_EQ(CampaignsOf(path), "sand finished");
+}
+
+/// States in the file that is filled.
+constexpr int kStates = 20'000;
+
+/// FileOfVersion with states of one evaluation.
+std::string FullFileOfVersion(int version) {
+  const std::string path = FileOfVersion(version);
+  Connection connection(path, true);
+  connection.database().exec(absl::StrCat(
+      "INSERT INTO evaluation(campaign, sample, experiment, status, digest) VALUES(1, 3, 0, "
+      "'finished', 'd'); "
+      "WITH RECURSIVE step(k) AS (SELECT 0 UNION ALL SELECT k + 1 FROM step WHERE k + 1 < ",
+      kStates,
+      ") INSERT INTO state(campaign, sample, experiment, load_step, observables) "
+      "SELECT 1, 3, 0, k, zeroblob(64) FROM step"));
+  return path;
+}
+
+/// A process of its own opens the file, and is killed after this while; whether it was through.
+bool OpensBefore(const std::string& path, std::chrono::microseconds while_open) {
+  const pid_t child = fork();
+  if (child == 0) _exit(Store::Open(path).ok() ? 0 : 1);
+  std::this_thread::sleep_for(while_open);
+  kill(child, SIGKILL);
+  int status = 0;
+  EXPECT_EQ(waitpid(child, &status, 0), child);
+  return WIFEXITED(status);
+}
+
+TEST(Migrations, KilledAtAnyMomentTheyGoOnWithEverything) {
+  const int last = static_cast<int>(Migrations().size());
+  std::mt19937 random(20261130);
+  int killed = 0;
+  int between = 0;  // of these, behind the first step and before the last
+  for (int version = 1; version < last; ++version) {
+    const auto begin = std::chrono::steady_clock::now();
+    ASSERT_FALSE(OpensBefore(FullFileOfVersion(version), std::chrono::microseconds(0)));
+    ASSERT_TRUE(Store::Open(FileNameOf(version)).ok());
+    const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(
+        std::chrono::steady_clock::now() - begin);
+    for (int round = 0; round < 6; ++round) {
+      const std::string path = FullFileOfVersion(version);
+      std::uniform_int_distribution<std::int64_t> moment(0, whole.count());
+      if (OpensBefore(path, std::chrono::microseconds(moment(random)))) continue;
+      ++killed;
+      const int reached = SchemaOf(path);
+      ASSERT_GE(reached, version);
+      between += reached > version && reached < last ? 1 : 0;
+      if (reached > version) {
+        EXPECT_EQ(SchemaOf(CopyOf(path)), version) << "a copy comes first";
+      }
+      {
+        auto store = Store::Open(path);
+        ASSERT_TRUE(store.ok()) << version << " " << reached << ": " << store.status();
+      }
+      SQLite::Database file(path, SQLite::OPEN_READONLY);
+      EXPECT_EQ(file.execAndGet("PRAGMA integrity_check").getString(), "ok");
+      EXPECT_EQ(file.execAndGet("SELECT count(*) FROM state").getInt(), kStates);
+      EXPECT_EQ(CampaignsOf(path), "sand finished");
+    }
+  }
+  EXPECT_GT(killed, 6);
+  std::cout << killed << " killed, " << between << " of them between two steps\n";
 }
 
 TEST(Migrations, FileOfANewerProgramIsRefused) {

@@ -266,6 +266,7 @@ export interface Worker {
   draining: boolean;
   connected: boolean;
   left: boolean;
+  waits: string | null;
   seconds_since_heard: number;
   running: string[];
   engine_version: string;

@@ -128,6 +128,8 @@ Case Jump(std::uint64_t seed) {
 struct Score {
   double mean = 0, width = 0, evidence = 0;  // largest errors: sd, relative, nats
   double mean_stated = 0, stated = 0;        // standard errors of the means [sd], of the evidence
+  VectorXd of_means, of_widths;              // errors in standard errors as stated
+  double of_evidence = 0;
   Index runs = 0;
   AdaptiveStage stage = AdaptiveStage::kFirst;
   bool MeetsMean() const { return mean < 0.15; }
@@ -151,6 +153,9 @@ std::vector<Score> ScoresOf(const std::function<Case(std::uint64_t)>& make, int 
       score.width = (p.sd.array() / r.sd.array() - 1).abs().maxCoeff();
       score.evidence = std::abs(p.log_evidence - r.log_evidence);
       score.stated = p.log_evidence_error;
+      score.of_means = (p.mean - r.mean).array() / p.mean_error.array();
+      score.of_widths = (p.sd.array() / r.sd.array()).log() / p.log_sd_error.array();
+      score.of_evidence = (p.log_evidence - r.log_evidence) / score.stated;
       score.mean_stated = (p.mean_error.array() / p.sd.array()).maxCoeff();
       std::cout << name << " seed " << seed << ": mean " << score.mean << " sd, said "
                 << (p.mean_error.array() / p.sd.array()).maxCoeff() << "; width " << score.width
@@ -177,6 +182,20 @@ std::vector<Score> ScoresOf(const std::function<Case(std::uint64_t)>& make, int 
                  return s.stage != AdaptiveStage::kConverged ||
                         (s.MeetsMean() && s.MeetsWidth() && s.MeetsEvidence());
                })
+            << "\n";
+  const auto root_mean_square = [&](const auto& errors_of) {
+    double sum = 0, count = 0;
+    for (const Score& score : scores) {
+      const VectorXd errors = errors_of(score);
+      sum += errors.squaredNorm();
+      count += static_cast<double>(errors.size());
+    }
+    return std::sqrt(sum / count);
+  };
+  std::cout << name << ": root mean square error in standard errors as stated: means "
+            << root_mean_square([](const Score& s) { return s.of_means; }) << ", widths "
+            << root_mean_square([](const Score& s) { return s.of_widths; }) << ", evidence "
+            << root_mean_square([](const Score& s) { return VectorXd::Constant(1, s.of_evidence); })
             << "\n";
   return scores;
 }

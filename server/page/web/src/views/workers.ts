@@ -18,13 +18,13 @@ export function workersView(root: HTMLElement, answers: Answers): () => void {
       replace(holder, empty("No worker yet", "One appears here when it connects:", h("code", {}, "calib-worker --server HOST:PORT")));
       return;
     }
-    const word = (w: Worker): string => (w.left ? "left" : !w.connected ? "lost" : w.draining ? "draining" : w.busy > 0 ? "computing" : "idle");
+    const word = (w: Worker): string => (w.left ? "left" : !w.connected ? "lost" : w.waits ? "waits" : w.draining ? "draining" : w.busy > 0 ? "computing" : "idle");
     replace(holder, h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Workers" }, h("table", {},
       h("thead", {}, h("tr", {}, ["worker", "state", "busy", "contact updates [1/s]", "last heard", "running", "processor"].map((name) =>
         h("th", { scope: "col", class: ["worker", "state", "running", "processor"].includes(name) ? "text" : "" }, name)))),
       h("tbody", {}, answer.value.map((w) => h("tr", { "data-worker": w.name },
         h("th", { scope: "row", class: "name" }, w.name),
-        h("td", { class: "text" }, word(w)),
+        h("td", { class: "text" }, word(w), w.waits ? h("span", { class: "sub" }, w.waits) : ""),
         h("td", {}, value(w.busy, numberText(w.busy)), " / ", value(w.slots, numberText(w.slots))),
         h("td", {}, value(w.contact_updates_per_second, numberText(w.contact_updates_per_second, 3))),
         h("td", {}, value(w.seconds_since_heard, durationText(w.seconds_since_heard))),
