@@ -69,7 +69,7 @@ TEST(Simulation, AFileThatCannotBeReadNowIsNoFaultOfItsCampaign) {
   EXPECT_GT(reads([&](store::Reader& reader) {
               return planning::LoadDefinition(methods::All(), reader, submitted).status();
             }),
-            10);
+            5);
   EXPECT_GT(reads([&](store::Reader& reader) -> absl::Status {
               const auto checked = service::CheckSubmission(request, service::Limits(), reader);
               if (!checked.ok()) return checked.status();
