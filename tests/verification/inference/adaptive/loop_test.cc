@@ -128,7 +128,7 @@ Case Jump(std::uint64_t seed) {
 struct Score {
   double mean = 0, width = 0, evidence = 0;  // largest errors: sd, relative, nats
   double mean_stated = 0, stated = 0;        // standard errors of the means [sd], of the evidence
-  VectorXd of_means, of_widths;              // errors in standard errors as stated
+  VectorXd of_means{}, of_widths{};          // errors in standard errors as stated
   double of_evidence = 0;
   Index runs = 0;
   AdaptiveStage stage = AdaptiveStage::kFirst;
