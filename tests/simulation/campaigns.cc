@@ -1,13 +1,13 @@
 #include "tests/simulation/campaigns.h"
 
 #include <bit>
-#include <cmath>
 #include <cstring>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/catalog.h"
 #include "server/planning/posterior_record.h"
+#include "tests/support/smooth_curve.h"
 
 namespace calib::simulation {
 namespace {
@@ -115,16 +115,7 @@ RunEnd EndOf(const v1::AttemptSpec& spec) {
 }
 
 v1::State StateOf(const v1::AttemptSpec& spec, int load_step) {
-  const double stiffness = std::log(spec.parameters().at("young_modulus") / 5e7);
-  const double friction = spec.parameters().at("friction_angle");
-  const double packing =
-      spec.packing_digest().empty()
-          ? 0
-          : std::stoi(spec.packing_digest().substr(0, 4), nullptr, 16) / 32768.0 - 1;
-  // Of digits that no measurement knows.
-  const double repeat = 2 * std::fmod(1e9 * std::abs(stiffness), 1) - 1;
-  const double value = (1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)))) *
-                       (1 + 0.02 * packing + 0.005 * repeat);
+  const double value = testing::SmoothCurve(spec, load_step, 0.02, 0.005);
   v1::State state;
   state.set_load_step(load_step);
   const std::size_t width = dem::FindTest(spec.test())->observables.size();

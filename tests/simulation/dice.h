@@ -5,7 +5,8 @@
 
 namespace calib::simulation {
 
-/// SplitMix64 [Steele, Lea & Flood 2014]. Not thread-safe.
+/// SplitMix64 [Steele, Lea & Flood 2014]. Two throws are two statements: in which order arguments of
+/// one call are thrown is the compiler's choice. Not thread-safe.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : state_(seed) {}

@@ -15,7 +15,6 @@ struct Fault {
   std::string name{};
   bool in_scheduler = false;  ///< planted in the copy: simulate_planted has it
   std::uint64_t seed = 0;     ///< that finds it
-  bool is_rare = false;       ///< no seed is kept: less than one in two hundred finds it
 };
 
 const std::vector<Fault>& Faults();

@@ -9,7 +9,7 @@ namespace {
 
 TEST(Planted, IsFoundByItsSeedAndNothingWithoutIt) {
   for (const Fault& fault : Faults()) {
-    if (!fault.in_scheduler || fault.is_rare) continue;
+    if (!fault.in_scheduler) continue;
     EXPECT_NE(Simulate({.seed = fault.seed, .fault = fault.name}).violation, "") << fault.name;
     EXPECT_EQ(Simulate({.seed = fault.seed}).violation, "") << fault.name;
   }
@@ -18,7 +18,6 @@ TEST(Planted, IsFoundByItsSeedAndNothingWithoutIt) {
 // Of every fault, from any seeds: deploy/nightly.
 TEST(PlantedSlow, IsFoundWithinTwoHundredSeeds) {
   for (const Fault& fault : Faults()) {
-    if (fault.is_rare) continue;
     std::uint64_t seed = 1001;
     while (seed <= 1200 && Simulate({.seed = seed, .fault = fault.name}).violation.empty()) ++seed;
     EXPECT_LE(seed, 1200U) << fault.name;

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <set>
 #include <utility>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "tests/simulation/faults.h"
+#include "tests/simulation/lease_watch.h"
+#include "tests/simulation/people.h"
 
 namespace calib::simulation {
 namespace {
@@ -62,15 +63,6 @@ struct Action {
   std::size_t index;
 };
 
-/// What somebody asks for, until it is answered.
-struct Asked {
-  ServerProcess::Wish wish;
-  int campaign = -1;  ///< of submit: which
-  Time at{};
-  bool under_way = false;
-  bool answered = false;
-};
-
 /// A message as events have it: of states only which.
 std::string Brief(const v1::WorkerMessage& message) {
   std::string text;
@@ -122,9 +114,8 @@ class Simulation final : public Watcher, public Surroundings {
   void Takes(const Stream& stream, const v1::WorkerMessage& message) override {
     Tell("takes", stream, Brief(message));
     ledger_.Takes(message);
-    auto& [newest, heard] = heard_[workers_[Worker(stream)].options().name];
-    if (message.has_hello()) newest = stream.number;
-    if (stream.number == newest) heard = clocks_.now;
+    leases_.Heard(workers_[Worker(stream)].options().name, stream.number, message.has_hello(),
+                  clocks_.now);
   }
   void Sends(const Stream& stream, const v1::ServerMessage& message) override {
     Tell("sends", stream,
@@ -142,32 +133,7 @@ class Simulation final : public Watcher, public Surroundings {
     }
   }
   void AfterTask(bool of_tick) override {
-    scheduler::Scheduler& scheduler = server_->scheduler();
-    if (scheduler.workers_changed() == workers_seen_) return;
-    workers_seen_ = scheduler.workers_changed();
-    std::set<std::string> all;
-    for (const v1::WorkerInfo& worker : scheduler.Workers()) {
-      std::multiset<std::string> runs(worker.running().begin(), worker.running().end());
-      for (const std::string& run : runs) {
-        if (!all.insert(run).second) Violate(absl::StrCat("two leases of the run ", run));
-      }
-      auto& [drained, before] = leased_[worker.name()];
-      if (drained && worker.draining() &&
-          !std::includes(before.begin(), before.end(), runs.begin(), runs.end())) {
-        Violate(absl::StrCat("worker ", worker.name(), " drains and is leased more"));
-      }
-      drained = worker.draining();
-      const auto heard = heard_.find(worker.name());
-      if (of_tick && heard != heard_.end() && clocks_.now - heard->second.second <= kLease &&
-          runs.size() < before.size()) {
-        Violate(absl::StrCat("a lease of ", worker.name(), " has ended, which was heard"));
-      }
-      before = std::move(runs);
-      if (worker.busy() > worker.slots()) {
-        Violate(absl::StrCat("worker ", worker.name(), " has ", worker.busy(), " slots busy of ",
-                             worker.slots()));
-      }
-    }
+    Violate(leases_.Look(server_->scheduler(), clocks_.now, of_tick));
   }
   milliseconds Delay() override {
     if (calm_) return milliseconds(dice_.Below(3));
@@ -213,7 +179,7 @@ class Simulation final : public Watcher, public Surroundings {
       starts_.push_back(clocks_.now);
       gone_.push_back(false);
     }
-    Submit(alone ? options_.campaign : AnyCampaign(), "ann", clocks_.now);
+    people_.Submit(alone ? options_.campaign : AnyCampaign(), "ann", clocks_.now);
     if (alone) return;
     calm_at_ = clocks_.now + milliseconds(dice_.Between(500, 15000));
     for (int i = 0; i < kTroubles; ++i) {
@@ -225,8 +191,8 @@ class Simulation final : public Watcher, public Surroundings {
     nodes_fail_ = dice_.OnceIn(3);
     gathers_ = !dice_.OnceIn(3);
     if (dice_.OnceIn(3)) {
-      Submit(dice_.OnceIn(3) ? asked_.front().campaign : AnyCampaign(), "bob",
-             clocks_.now + milliseconds(dice_.Below(3000)));
+      const int campaign = dice_.OnceIn(3) ? people_.first_campaign() : AnyCampaign();
+      people_.Submit(campaign, "bob", clocks_.now + milliseconds(dice_.Below(3000)));
     }
   }
 
@@ -242,24 +208,6 @@ class Simulation final : public Watcher, public Surroundings {
     int i = 0;
     while ((chosen -= Campaigns()[static_cast<std::size_t>(i)].often) >= 0) ++i;
     return i;
-  }
-
-  void Submit(int campaign, const std::string& owner, Time at) {
-    const SimulatedCampaign& chosen = Campaigns()[static_cast<std::size_t>(campaign)];
-    Asked& asked = Wish("submit", 0, at);
-    asked.campaign = campaign;
-    asked.wish.owner = owner;
-    asked.wish.files = chosen.files.files;
-    asked.wish.yaml = chosen.files.yaml;
-  }
-
-  Asked& Wish(const std::string& verb, std::int64_t campaign, Time at) {
-    Asked& asked = asked_.emplace_back();
-    asked.wish.verb = verb;
-    asked.wish.campaign = campaign;
-    asked.wish.key = absl::StrCat("r", ++last_request_);
-    asked.at = at;
-    return asked;
   }
 
   // ---- what goes on ----
@@ -287,7 +235,8 @@ class Simulation final : public Watcher, public Surroundings {
       Do(actions_[static_cast<std::size_t>(dice_.Below(static_cast<int>(actions_.size())))]);
     }
     if (server_ != nullptr && (disk_.left() || (server_->failed() && dice_.OnceIn(10)))) {
-      StopServer(/*in_order=*/!disk_.left() && dice_.OnceIn(2), dice_.OnceIn(2));
+      const bool in_order = !disk_.left() && dice_.OnceIn(2);
+      StopServer(in_order, /*power=*/dice_.OnceIn(2));
     }
     std::erase_if(streams_, [](const auto& s) { return s->worker_left && s->server_left; });
     if (calm_ && (++calm_steps_ > kMostCalmSteps || clocks_.now > calm_at_ + kBound)) {
@@ -295,8 +244,8 @@ class Simulation final : public Watcher, public Surroundings {
       for (const std::int64_t id : ledger_.Open()) {
         absl::StrAppend(&open, "; ", ledger_.Summary(id));
       }
-      for (const Asked& asked : asked_) {
-        if (!asked.answered) absl::StrAppend(&open, "; no answer to ", asked.wish.verb);
+      for (const std::string& verb : people_.Waiting()) {
+        absl::StrAppend(&open, "; no answer to ", verb);
       }
       for (const WorkerProcess& worker : workers_) {
         absl::StrAppend(&open, "; ", worker.options().name, " holds ", worker.holds());
@@ -323,11 +272,8 @@ class Simulation final : public Watcher, public Surroundings {
         if (server_->MayRead(*streams_[i])) actions_.push_back({Kind::kRead, i});
         if (server_->MayForget(*streams_[i])) actions_.push_back({Kind::kForget, i});
       }
-      for (std::size_t i = 0; i < asked_.size(); ++i) {
-        const Asked& asked = asked_[i];
-        if (!asked.answered && !asked.under_way && asked.at <= clocks_.now) {
-          actions_.push_back({Kind::kAsk, i});
-        }
+      for (std::size_t i = 0; i < people_.wishes(); ++i) {
+        if (people_.IsDue(i)) actions_.push_back({Kind::kAsk, i});
       }
     }
     for (std::size_t i = 0; i < workers_.size(); ++i) {
@@ -386,7 +332,7 @@ class Simulation final : public Watcher, public Surroundings {
         workers_[i].Go();
         break;
       case Kind::kAsk:
-        Ask(i);
+        people_.Ask(i, *server_);
         break;
     }
   }
@@ -421,9 +367,7 @@ class Simulation final : public Watcher, public Surroundings {
       for (const auto& stream : streams_) {
         if (!stream->up.empty() && !stream->server_left) at(stream->up.front().due);
       }
-      for (const Asked& asked : asked_) {
-        if (!asked.answered && !asked.under_way) at(asked.at);
-      }
+      at(people_.next());
     }
     if (!calm_) at(calm_at_);
     return std::max(next, clocks_.now + milliseconds(1));
@@ -441,16 +385,14 @@ class Simulation final : public Watcher, public Surroundings {
     disk_.Mount();
     // A file of an earlier schema is copied before it is migrated, and not on this disk.
     if (!calm_ && has_started_ && dice_.OnceIn(8)) {
-      disk_.Expect(dice_.OnceIn(2) ? DiskTrouble::kDies : DiskTrouble::kReadFails, dice_.Below(40),
-                   1);
+      const DiskTrouble trouble = dice_.OnceIn(2) ? DiskTrouble::kDies : DiskTrouble::kReadFails;
+      disk_.Expect(trouble, dice_.Below(40), 1);
     }
     server_ = std::make_unique<ServerProcess>(
         clocks_, dice_, static_cast<Watcher&>(*this),
         PortFaults{.acknowledges_early = options_.fault == "early_acknowledgement",
                    .reorders_writes = options_.fault == "reordered_writes"});
-    workers_seen_ = 0;
-    leased_.clear();
-    heard_.clear();
+    leases_ = LeaseWatch(kLease);
     const absl::Status started = server_->Start(kPath, {.lease = kLease,
                                                         .heartbeat = kHeartbeat,
                                                         .gather = milliseconds(gathers_ ? 30 : 0),
@@ -485,10 +427,7 @@ class Simulation final : public Watcher, public Surroundings {
     ledger_.Close();
     server_.reset();
     if (!in_order && power) disk_.CutPower(dice_);
-    for (Asked& asked : asked_) {
-      if (asked.under_way) asked.at = clocks_.now + milliseconds(dice_.Below(1000));
-      asked.under_way = false;
-    }
+    people_.ServerIsGone();
     server_starts_ = clocks_.now + milliseconds(calm_ ? 20 : dice_.Between(20, 2500));
   }
 
@@ -499,77 +438,6 @@ class Simulation final : public Watcher, public Surroundings {
         static_cast<std::size_t>(dice_.Between(0, static_cast<int>(stream.up.size()))));
     stream.down.resize(
         static_cast<std::size_t>(dice_.Between(0, static_cast<int>(stream.down.size()))));
-  }
-
-  // ---- people ----
-  void Ask(std::size_t i) {
-    asked_[i].under_way = true;
-    const ServerProcess::Wish wish = asked_[i].wish;
-    Event(absl::StrCat("somebody asks: ", wish.verb, " c", wish.campaign, " ", wish.key));
-    if (wish.verb == "delete") ledger_.Deletes(wish.campaign);
-    server_->Ask(wish, [this, i](const absl::StatusOr<std::string>& answer) { Answer(i, answer); });
-  }
-
-  void Answer(std::size_t i, const absl::StatusOr<std::string>& answer) {
-    Asked& asked = asked_[i];
-    const std::string& verb = asked.wish.verb;
-    Event(absl::StrCat(asked.wish.key,
-                       " is answered: ", answer.ok() ? *answer : answer.status().ToString()));
-    asked.under_way = false;
-    if (absl::IsUnavailable(answer.status()) || absl::IsResourceExhausted(answer.status()) ||
-        absl::IsPermissionDenied(answer.status())) {
-      asked.at = clocks_.now + milliseconds(dice_.Between(20, 800));
-      return;
-    }
-    if (verb == "add_runs" && absl::IsFailedPrecondition(answer.status()) &&
-        ledger_.StateOf(asked.wish.campaign) != "cancelled") {  // what it has must end first
-      asked.at = clocks_.now + milliseconds(dice_.Between(20, 500));
-      return;
-    }
-    asked.answered = true;
-    if (!answer.ok()) {
-      if (verb == "submit")
-        Violate(absl::StrCat("a campaign is refused: ", answer.status().ToString()));
-      return;
-    }
-    if (verb == "add_runs") {
-      AddRuns(asked.wish.campaign, asked.campaign, asked.wish.runs.iteration + 1);
-    }
-    if (verb != "quota" && verb != "submit" && verb != "add_runs") ledger_.Answered(asked.wish.key);
-    if (verb == "cancel") ledger_.Cancelled(asked.wish.campaign);
-    if (verb == "resume") resumed_.insert(asked.wish.campaign);
-    if (verb == "submit") {
-      const std::int64_t id = std::stoll(answer->substr(1));
-      if (submitted_.emplace(id, asked.campaign).second) {
-        ledger_.Submitted(id);
-        AddRuns(id, asked.campaign, 0);
-      }
-    }
-  }
-
-  /// The next batch of a design, if there is one.
-  void AddRuns(std::int64_t id, int campaign, int batch) {
-    const auto& batches = Campaigns()[static_cast<std::size_t>(campaign)].batches;
-    if (batch >= static_cast<int>(batches.size())) return;
-    Asked& asked = Wish("add_runs", id, clocks_.now);
-    asked.campaign = campaign;
-    asked.wish.runs = batches[static_cast<std::size_t>(batch)];
-    asked.wish.runs.campaign = id;
-  }
-
-  /// Whoever paused campaigns, or set quotas, thinks better of it.
-  void SetRight() {
-    for (const std::int64_t campaign : ledger_.Paused()) {
-      const bool is_asked = std::any_of(asked_.begin(), asked_.end(), [&](const Asked& asked) {
-        return !asked.answered && asked.wish.verb == "resume" && asked.wish.campaign == campaign;
-      });
-      if (!is_asked) Wish("resume", campaign, clocks_.now);
-    }
-    if (std::exchange(has_quota_, false)) {
-      Asked& asked = Wish("quota", 0, clocks_.now);
-      asked.wish.owner = "ann";
-      asked.wish.number = -1;
-    }
   }
 
   // ---- troubles ----
@@ -630,9 +498,11 @@ class Simulation final : public Watcher, public Surroundings {
       case Trouble::kDiskFails:
         disk_.Expect(DiskTrouble::kWriteFails, soon(40), 1);
         break;
-      case Trouble::kDiskFull:
-        disk_.Expect(DiskTrouble::kFull, soon(40), dice_.Between(1, 5));
+      case Trouble::kDiskFull: {
+        const int times = dice_.Between(1, 5);
+        disk_.Expect(DiskTrouble::kFull, soon(40), times);
         break;
+      }
       case Trouble::kDiskDies:
         disk_.Expect(DiskTrouble::kDies, soon(60), 1);
         break;
@@ -652,7 +522,7 @@ class Simulation final : public Watcher, public Surroundings {
         clocks_.unix_ms += dice_.Between(-3'600'000, 3'600'000);
         break;
       case Trouble::kPeople:
-        WishAnything();
+        people_.WishAnything();
         break;
       case Trouble::kLooks:
         if (server_ != nullptr && !server_->failed()) (void)server_->scheduler().AllLive();
@@ -660,40 +530,6 @@ class Simulation final : public Watcher, public Surroundings {
       case Trouble::kLogEmptied:
         if (server_ != nullptr) ledger_.EmptyLog();
         break;
-    }
-  }
-
-  void WishAnything() {
-    if (submitted_.empty()) return;
-    auto chosen = submitted_.begin();
-    std::advance(chosen, dice_.Below(static_cast<int>(submitted_.size())));
-    const std::int64_t id = chosen->first;
-    // The first submitted is to come to its end.
-    const bool may_go = id > 1;
-    switch (dice_.Below(8)) {
-      case 0:
-      case 1:
-        Wish("pause", id, clocks_.now);
-        break;
-      case 2:
-      case 3:
-      case 4:
-        Wish("resume", id, clocks_.now);
-        break;
-      case 5:
-        Wish("priority", id, clocks_.now).wish.number = dice_.Between(-3, 3);
-        break;
-      case 6:
-        if (may_go) {
-          Wish(ledger_.StateOf(id) == "cancelled" ? "delete" : "cancel", id, clocks_.now);
-        }
-        break;
-      default: {
-        Asked& asked = Wish("quota", 0, clocks_.now);
-        asked.wish.owner = "ann";
-        asked.wish.number = dice_.Below(3);
-        has_quota_ = true;
-      }
     }
   }
 
@@ -714,11 +550,9 @@ class Simulation final : public Watcher, public Surroundings {
     if (++looked_ % 16 != 0 || server_ == nullptr) return false;
     if (clocks_.now >= set_right_at_) {
       set_right_at_ = clocks_.now + milliseconds(calm_ ? 300 : 2500);
-      if (calm_ || dice_.OnceIn(2)) SetRight();
+      if (calm_ || dice_.OnceIn(2)) people_.SetRight();
     }
-    for (const Asked& asked : asked_) {
-      if (!asked.answered) return false;
-    }
+    if (!people_.Waiting().empty()) return false;
     if (!ledger_.Open().empty()) return false;
     if (!calm_) BeCalm();
     return std::all_of(workers_.begin(), workers_.end(),
@@ -733,7 +567,7 @@ class Simulation final : public Watcher, public Surroundings {
     StartServer();
     if (!result_.violation.empty()) return;
     auto reader = server_->Read();
-    for (const auto& [id, campaign] : submitted_) {
+    for (const auto& [id, campaign] : people_.submitted()) {
       const std::string state = ledger_.StateOf(id);
       if (state == "cancelled" || state.empty()) continue;
       if (state != "finished") {
@@ -742,7 +576,7 @@ class Simulation final : public Watcher, public Surroundings {
       }
       const SimulatedCampaign& of = Campaigns()[static_cast<std::size_t>(campaign)];
       Violate(ledger_.CheckEnd(
-          {.campaign = id, .resumed = resumed_.count(id) > 0, .goes_on = of.goes_on}));
+          {.campaign = id, .resumed = people_.HasResumed(id), .goes_on = of.goes_on}));
       auto fingerprint = Fingerprint(*reader, id);
       if (!fingerprint.ok()) {
         Violate(absl::StrCat("c", id, " cannot be read: ", fingerprint.status().ToString()));
@@ -803,11 +637,11 @@ class Simulation final : public Watcher, public Surroundings {
   std::vector<bool> gone_;
   std::vector<std::shared_ptr<Stream>> streams_;
   int last_stream_ = 0;
-  std::deque<Asked> asked_;
-  int last_request_ = 0;
-  std::map<std::int64_t, int> submitted_;
-  std::set<std::int64_t> resumed_;
-  bool has_quota_ = false;
+  People people_{clocks_,
+                 dice_,
+                 ledger_,
+                 {.event = [this](const std::string& what) { Event(what); },
+                  .violate = [this](const std::string& what) { Violate(what); }}};
   Time set_right_at_{};
   std::vector<Trouble> troubles_;
   int trouble_every_ = 100;
@@ -816,9 +650,7 @@ class Simulation final : public Watcher, public Surroundings {
   bool nodes_fail_ = false;
   bool gathers_ = true;
   std::vector<Action> actions_;
-  std::uint64_t workers_seen_ = 0;
-  std::map<std::string, std::pair<bool, std::multiset<std::string>>> leased_;
-  std::map<std::string, std::pair<int, Time>> heard_;  // newest stream, and when it last spoke
+  LeaseWatch leases_{kLease};
   unsigned looked_ = 0;
   std::deque<std::string> last_;
 };

@@ -81,9 +81,6 @@ PLACES = [
      '''  if (IsPlanted("iteration_lost")) run->progress().iteration = 0;
   std::vector<EvaluationKey> again;
   std::map<EvaluationKey, std::string> others;'''),
-    ('never_returned', 'scheduler.cc',
-     '''    ReturnUnleased(*run);  // given back by a server that could not read the campaign''',
-     '''    if (!IsPlanted("never_returned")) ReturnUnleased(*run);'''),
     ('one_renewed', 'leases/lease_table.cc',
      '''          std::max({holder.heard, leases_.at(attempt).started, pardoned_}) + lease_;''',
      '''          std::max({IsPlanted("one_renewed") && attempt != *holder.attempts.begin() ? leases_.at(attempt).started : holder.heard,

@@ -158,6 +158,7 @@ TEST(CampaignLife, WhatRunsByTheStoreAndByNoAttemptIsLeasedByTheNextServer) {
   EXPECT_TRUE(service.Next(after, Kind::kAck).ack().refused());
   const v1::Lease again = service.Next(after, Kind::kLease).lease();
   EXPECT_GT(again.attempt(), lease.attempt());
+  EXPECT_EQ(again.run(), lease.run()) << "it is the first that waits";
 }
 
 TEST(CampaignLife, LeavingWorkerGivesBackWhatIsOnItsWayToIt) {

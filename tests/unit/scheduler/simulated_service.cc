@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <set>
@@ -13,27 +12,19 @@
 #include "server/campaign/model/sha256.h"
 #include "server/planning/history.h"
 #include "server/planning/posterior_record.h"
+#include "tests/support/smooth_curve.h"
 
 namespace calib::scheduler {
 namespace {
 
 constexpr std::chrono::milliseconds kLease(1000);
 
-/// A smooth curve with the parameters in it, in place of the mechanics.
+/// In place of the mechanics; an error of the load cell, where the run has one, reads it larger.
 double Model(const v1::AttemptSpec& spec, int load_step, double packing_scatter,
              double repeat_scatter) {
-  const double stiffness = std::log(spec.parameters().at("young_modulus") / 5e7);
-  const double friction = spec.parameters().at("friction_angle");
-  const double packing =
-      spec.packing_digest().empty()
-          ? 0
-          : std::stoi(spec.packing_digest().substr(0, 4), nullptr, 16) / 32768.0 - 1;
-  // Of digits that no measurement knows.
-  const double repeat = 2 * std::fmod(1e9 * std::abs(stiffness), 1) - 1;
-  const auto gain = spec.parameters().find("load_cell_error.gain");  // where the run has it
+  const auto gain = spec.parameters().find("load_cell_error.gain");
   const double read = gain == spec.parameters().end() ? 1 : 1 + gain->second;
-  return read * (1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)))) *
-         (1 + packing_scatter * packing + repeat_scatter * repeat);
+  return read * testing::SmoothCurve(spec, load_step, packing_scatter, repeat_scatter);
 }
 
 std::string Bytes(const std::vector<double>& values) {

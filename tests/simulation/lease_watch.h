@@ -1,0 +1,42 @@
+#pragma once
+// What has to hold of leases, as a server lists them: one a run, kept by who is heard, none for who
+// drains.
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/scheduler/scheduler.h"
+#include "tests/simulation/wire.h"
+
+namespace calib::simulation {
+
+/// Of one server program. Not thread-safe.
+class LeaseWatch {
+ public:
+  explicit LeaseWatch(milliseconds lease) : lease_(lease) {}
+
+  /// The server takes in a message of this worker, over this stream.
+  void Heard(const std::string& worker, int stream, bool is_hello, Time now);
+  /// After each task of the strand; of_tick: it was by the clock alone. What is wrong, a sentence;
+  /// empty: nothing is.
+  std::string Look(scheduler::Scheduler& scheduler, Time now, bool of_tick);
+
+ private:
+  struct Leased {
+    bool drains = false;
+    std::multiset<std::string> runs{};
+  };
+  struct Voice {
+    int stream = 0;  // the newest
+    Time heard{};
+  };
+  milliseconds lease_;
+  std::uint64_t seen_ = 0;  // Scheduler::workers_changed
+  std::map<std::string, Leased> leased_;
+  std::map<std::string, Voice> voices_;
+};
+
+}  // namespace calib::simulation
