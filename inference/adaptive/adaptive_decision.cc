@@ -41,7 +41,8 @@ constexpr double kWantedError = 0.1;
 // Largest moves between two posteriors within the options' limits.
 bool HasSettled(const AdaptiveMemory& before, const AdaptiveMemory& after,
                 const AdaptiveOptions& options) {
-  if (before.sd.size() == 0 || after.sd.size() == 0) return false;
+  if (before.sd.size() == 0 || after.sd.size() == 0 || before.batches >= after.batches)
+    return false;
   const Eigen::ArrayXd sd = after.sd.array().max(1e-300);
   return ((after.mean - before.mean).array().abs() / sd).maxCoeff() < options.mean_moves &&
          (before.sd.array() / sd - 1).abs().maxCoeff() < options.width_moves;
@@ -183,19 +184,31 @@ int LeastMaxRuns(Index parameters, const AdaptiveOptions& options) {
   return FirstRunsOf(parameters, options) + 2 * options.batch + options.verify;
 }
 
+bool MayOverlap(std::span<const AdaptiveMemory> earlier) {
+  return earlier.size() >= 2 && earlier.back().stage != AdaptiveStage::kVerifying;
+}
+
 absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
-                                                const AdaptiveRuns& runs,
+                                                const AdaptiveRuns& asked_for,
                                                 std::span<const AdaptiveMemory> earlier,
                                                 const AdaptiveOptions& options) {
   RETURN_IF_ERROR(options.Validate());
   RETURN_IF_ERROR(problem.Validate());
-  RETURN_IF_ERROR(runs.Validate(problem));
+  RETURN_IF_ERROR(asked_for.Validate(problem));
+  const AdaptiveRuns runs = asked_for.Ended();
   const auto d = static_cast<Index>(problem.prior.size());
   const auto batches = static_cast<int>(earlier.size());
-  if ((runs.rows() == 0) != (batches == 0) || (batches > 0 && runs.batch.back() != batches - 1)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("runs of ", runs.rows() == 0 ? 0 : runs.batch.back() + 1, " batches, and ",
-                     batches, " earlier decisions"));
+  const auto batches_of = [](const AdaptiveRuns& some) {
+    return some.rows() == 0 ? 0 : some.batch.back() + 1;
+  };
+  const int ended = batches_of(runs);
+  if (batches_of(asked_for) != batches) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "runs of ", batches_of(asked_for), " batches, and ", batches, " earlier decisions"));
+  }
+  if (batches > 0 &&
+      (ended == 0 || (ended < batches && earlier.back().stage == AdaptiveStage::kVerifying))) {
+    return absl::InvalidArgumentError("there is nothing to decide before more runs have ended");
   }
   if (batches == 0) {
     const int least = LeastMaxRuns(d, options);
@@ -214,7 +227,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
 
   const auto complete =
       static_cast<Index>(std::count(runs.end.begin(), runs.end.end(), RunEnd::kComplete));
-  const auto left = static_cast<int>(options.max_runs - runs.rows());
+  const auto left = static_cast<int>(options.max_runs - asked_for.rows());
   if (complete < ResponseEmulator::LeastRuns(d)) {
     const std::string found =
         complete == 0 ? absl::StrCat("None of ", runs.rows(), " runs is complete")
@@ -235,6 +248,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   AdaptivePosterior posterior = SamplePosterior(problem, *emulator, region, sampling);
 
   AdaptiveDecision result;
+  result.memory.batches = ended;
   result.quality = emulator->quality();
   const std::string unfit = WhyUnfit(emulator->quality());
   const bool sampled = posterior.draws.rows() > 0;
@@ -254,7 +268,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
       sampled && ((posterior.mean_error.array() / posterior.sd.array().max(1e-300)).maxCoeff() <
                   options.mean_error);
   const bool ends = left < 1 || (left < options.batch && left < options.verify);
-  const auto ended = [&](AdaptiveStage stage, std::string reason) {
+  const auto end = [&](AdaptiveStage stage, std::string reason) {
     result.stage = result.memory.stage = stage;
     result.reason = std::move(reason);
     return result;
@@ -266,7 +280,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   const std::string uncertain = WhatIsUncertain(posterior, runs.rows(), options.names);
   if (result.verification.passed && settled && known && unfit.empty()) {
     result.posterior = std::move(posterior);
-    return ended(AdaptiveStage::kConverged, uncertain.empty() ? "" : uncertain.substr(1));
+    return end(AdaptiveStage::kConverged, uncertain.empty() ? "" : uncertain.substr(1));
   }
   if (ends) {
     result.posterior = std::move(posterior);
@@ -284,7 +298,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
     } else {
       absl::StrAppend(&why, "no runs are left to judge by.");
     }
-    return ended(AdaptiveStage::kNotConverged, absl::StrCat(why, uncertain));
+    return end(AdaptiveStage::kNotConverged, absl::StrCat(why, uncertain));
   }
 
   const bool just_failed = earlier.back().stage == AdaptiveStage::kVerifying;
@@ -293,11 +307,11 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
                       ((settled && settled_before && known && !just_failed) || last);
   if (verify) {
     result.stage = AdaptiveStage::kVerifying;
-    result.next = VerifyingRuns(problem, runs, posterior, options.verify);
+    result.next = VerifyingRuns(problem, asked_for, posterior, options.verify);
   } else {
     result.stage = AdaptiveStage::kSearching;
     const int count = std::min(options.batch, left);
-    result.next = NextBatch(problem, runs, *emulator, region, posterior,
+    result.next = NextBatch(problem, asked_for, *emulator, region, posterior,
                             {.runs = count,
                              .explore = std::min(options.explore, count),
                              .seed = options.seed,

@@ -48,6 +48,7 @@ enum class AdaptiveStage {
 struct AdaptiveMemory {
   AdaptiveStage stage = AdaptiveStage::kFirst;
   Eigen::VectorXd mean{}, sd{};  ///< d, standardised; empty where there was no posterior
+  int batches = 0;               ///< that had ended when it was taken
 };
 
 /// Fresh runs of the posterior against what was predicted of them before.
@@ -79,7 +80,14 @@ int FirstRunsOf(Eigen::Index parameters, const AdaptiveOptions& options);
 /// verification.
 int LeastMaxRuns(Eigen::Index parameters, const AdaptiveOptions& options);
 
-/// The decision after complete batches. Settled is a posterior whose means and widths have moved by
+/// Whether a decision may be taken while the last of these batches is pending: it does not judge,
+/// and others have ended before it. Where such a decision asks for no runs, that batch is waited
+/// for and another one taken.
+bool MayOverlap(std::span<const AdaptiveMemory> earlier);
+
+/// The decision after complete batches, those of which all runs are pending aside: their places
+/// count, and what later ones remember is compared where it knew more. Verifying runs are to have
+/// ended. Settled is a posterior whose means and widths have moved by
 /// less than the options say at each of the last two batches, and whose means are known well enough
 /// (a mean may rest where the emulator is wrong); then `verify` draws of it are run and
 /// predicted (Fisher's chi-squared above one in a thousand, and at least seven tenths of the

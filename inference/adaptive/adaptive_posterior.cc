@@ -115,9 +115,10 @@ void AddErrors(const ResponseEmulator& emulator, const AdaptiveSamplingOptions& 
                          .sample = static_cast<std::uint64_t>(r)});
     Eigen::MatrixXd normal(m, q);
     for (double& z : normal.reshaped()) z = stream.Normal();
-    for (Index k = 0; k < q; ++k)
+    for (Index k = 0; k < q; ++k) {
       drawn.mean.col(k) =
           prediction.mean.col(k) + root[static_cast<std::size_t>(k)] * normal.col(k);
+    }
     const Eigen::VectorXd ratio =
         SpecimenLogDensity(
             emulator.measured(), drawn,

@@ -40,6 +40,22 @@ AdaptiveRuns AdaptiveRuns::Before(int last) const {
           .coordinates = coordinates.topRows(n)};
 }
 
+AdaptiveRuns AdaptiveRuns::Ended() const {
+  std::vector<Index> kept;
+  AdaptiveRuns result;
+  for (Index i = 0; i < rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (end[at] == RunEnd::kPending) continue;
+    kept.push_back(i);
+    result.packing.push_back(packing[at]);
+    result.batch.push_back(batch[at]);
+    result.end.push_back(end[at]);
+  }
+  result.parameters = parameters(kept, Eigen::all);
+  result.coordinates = coordinates(kept, Eigen::all);
+  return result;
+}
+
 absl::Status AdaptiveRuns::Validate(const AdaptiveProblem& problem) const {
   const Index n = rows();
   const auto count = static_cast<std::size_t>(n);

@@ -16,6 +16,7 @@ enum class RunEnd {
   kFailed,    ///< the machine's fault, again and again
   kDiverged,  ///< the model cannot go on there
   kUnknown,   ///< lost
+  kPending,   ///< none yet: under way, and nothing of it is known
 };
 
 /// What runs are held against.
@@ -40,6 +41,8 @@ struct AdaptiveRuns {
   Eigen::Index rows() const { return parameters.rows(); }
   /// Those of batches before this one.
   AdaptiveRuns Before(int last) const;
+  /// Those that are not pending.
+  AdaptiveRuns Ended() const;
   /// INVALID_ARGUMENT: what does not fit the problem.
   absl::Status Validate(const AdaptiveProblem& problem) const;
 };

@@ -90,7 +90,7 @@ class ExpectedVariance {
     const Eigen::MatrixXd points = posterior.standard(rows, Eigen::all);
     const EmulatorPrediction prediction = emulator.Predict(points);
     square_ = (prediction.mean.rowwise() - emulator.measured().transpose()).array().square();
-    first_ = variance_ = prediction.variance;
+    first_ = begun_ = variance_ = prediction.variance;
     // The integral over the cube of f is the mean of f / sqrt(E[L^2]) over points of this density.
     weight_.resize(points.rows());
     for (Index i = 0; i < weight_.size(); ++i) {
@@ -116,13 +116,16 @@ class ExpectedVariance {
     return LogSquare(left);
   }
 
-  // Part of the variance that those taken are expected to end.
+  // Part of the variance that those taken since Begin() are expected to end.
   double Gain() const {
     const double all = LogSquare(Eigen::ArrayXXd::Zero(first_.rows(), first_.cols()));
-    const double before = std::exp(LogSquare(first_) - all);
+    const double before = std::exp(LogSquare(begun_) - all);
     const double after = std::exp(LogSquare(variance_) - all);
     return before < 1 ? std::clamp((after - before) / (1 - before), 0.0, 1.0) : 0;
   }
+
+  // What those taken so far end is not counted as gain of the others.
+  void Begin() { begun_ = variance_; }
 
   void Take(Index candidate) {
     for (Index k = 0; k < own_.size(); ++k) {
@@ -149,10 +152,18 @@ class ExpectedVariance {
   }
 
   Eigen::VectorXd own_, run_;
-  Eigen::ArrayXXd square_, first_, variance_;  // points x q
-  Eigen::ArrayXd weight_;                      // ln
+  Eigen::ArrayXXd square_, first_, begun_, variance_;  // points x q
+  Eigen::ArrayXd weight_;                              // ln
   std::vector<Eigen::MatrixXd> with_points_, between_;
 };
+
+std::vector<Index> Pending(const AdaptiveRuns& runs) {
+  std::vector<Index> pending;
+  for (Index i = 0; i < runs.rows(); ++i) {
+    if (runs.end[static_cast<std::size_t>(i)] == RunEnd::kPending) pending.push_back(i);
+  }
+  return pending;
+}
 
 // The place, standardised, that is farthest from all runs among those that might yet fit.
 Eigen::RowVectorXd Unexplored(const Eigen::MatrixXd& places, const Eigen::VectorXd& optimistic,
@@ -208,16 +219,21 @@ AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, s
 AdaptiveBatch NextBatch(const AdaptiveProblem& problem, const AdaptiveRuns& runs,
                         const ResponseEmulator& emulator, const KnownRegion& region,
                         const AdaptivePosterior& posterior, const BatchOptions& options) {
-  const Eigen::MatrixXd candidates = Candidates(problem, posterior);
-  ExpectedVariance expected(emulator, posterior, candidates);
-  Eigen::MatrixXd done(runs.rows() + options.runs, candidates.cols());
+  const Eigen::MatrixXd chosen_from = Candidates(problem, posterior);
+  Eigen::MatrixXd done(runs.rows() + options.runs, chosen_from.cols());
   done.topRows(runs.rows()) = StandardRows(problem.prior, runs.parameters);
+  const std::vector<Index> pending = Pending(runs);
+  Eigen::MatrixXd candidates(chosen_from.rows() + std::ssize(pending), chosen_from.cols());
+  candidates << chosen_from, done(pending, Eigen::all);
+  ExpectedVariance expected(emulator, posterior, candidates);
+  for (Index i = chosen_from.rows(); i < candidates.rows(); ++i) expected.Take(i);
+  expected.Begin();
   Index count = runs.rows();
-  std::vector<bool> taken(static_cast<std::size_t>(candidates.rows()), false);
+  std::vector<bool> taken(static_cast<std::size_t>(chosen_from.rows()), false);
   for (int step = 0; step < options.runs - options.explore; ++step) {
     Index best = -1;
     double most = -kInfinity;
-    for (Index i = 0; i < candidates.rows(); ++i) {
+    for (Index i = 0; i < chosen_from.rows(); ++i) {
       // On one packing the same run again says nothing; on others it is one run among many.
       if (taken[static_cast<std::size_t>(i)]) continue;
       const double known = expected.Known(i);

@@ -42,10 +42,12 @@ AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, s
 /// c its covariance with the point, s its own variance, T that of a run on a packing of its own.
 ///   [Järvenpää, Gutmann, Vehtari & Marttinen, Bayesian Anal. 16 (2021) 147, Eqs. 15-17;
 ///    for emulated outputs Sinsbeck & Nowak, SIAM/ASA J. Uncertain. Quantif. 5 (2017) 640]
+/// Pending runs count as made: what they will tell is unknown, not how much.
 /// Candidates are draws where the density may be large, some of them as far again or thrice as far
 /// from their mean. The exploring runs lie, of points all over the prior whose readings would not
 /// be excluded were the emulator off by three of its sd, farthest from all runs. Packings that hold
 /// the fewest runs come first. Deterministic in seed and number.
+/// emulator, posterior: of the runs that have ended
 AdaptiveBatch NextBatch(const AdaptiveProblem& problem, const AdaptiveRuns& runs,
                         const ResponseEmulator& emulator, const KnownRegion& region,
                         const AdaptivePosterior& posterior, const BatchOptions& options);

@@ -196,9 +196,10 @@ absl::StatusOr<ResponseEmulator> ResponseEmulator::Fit(const AdaptiveProblem& pr
   result.errors_ = {
       .noise = total.cwiseInverse(), .staging = Eigen::MatrixXd(q, 0), .share = problem.share};
   const Eigen::MatrixXd outputs = learned.outputs * scale.transpose();
-  if (!outputs.allFinite() || !result.measured_.allFinite())
+  if (!outputs.allFinite() || !result.measured_.allFinite()) {
     return absl::FailedPreconditionError(
         "the coordinates of the runs exceed what numbers can hold");
+  }
   ASSIGN_OR_RETURN(result.polynomials_, FitPolynomials(learned.inputs, outputs, learned.packing));
   for (Index k = 0; k < q; ++k) {
     // A coordinate that no process can be fitted to has its polynomial.

@@ -84,12 +84,13 @@ std::vector<SimulatedCampaign> MakeCampaigns() {
                                              .method = "surrogate_msrs",
                                              .inference = plain}),
                  .often = 1});
-  all.push_back({.name = "adaptive",
-                 .files = MakeSmallCampaign({.samples = 0,
-                                             .relative_noise = 0.02,
-                                             .method = "adaptive_emulator",
-                                             .inference = "  max_runs: 38\n"}),
-                 .often = 1});
+  all.push_back(
+      {.name = "adaptive",
+       .files = MakeSmallCampaign({.samples = 0,
+                                   .relative_noise = 0.02,
+                                   .method = "adaptive_emulator",
+                                   .inference = "  max_runs: 38\n  asynchronous: true\n"}),
+       .often = 1});
   return all;
 }
 

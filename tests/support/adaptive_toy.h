@@ -119,15 +119,25 @@ struct AdaptiveLoop {
   AdaptiveDecision decision;
 };
 
+/// asynchronous: the next batch is chosen while one runs.
 inline AdaptiveLoop Calibrate(const AdaptiveToy& toy, const AdaptiveOptions& options,
-                              const EndOfRun& end = {}) {
+                              const EndOfRun& end = {}, bool asynchronous = false) {
   const AdaptiveProblem& problem = toy.problem();
   const Eigen::Index q = problem.measured.size();
   AdaptiveLoop loop;
   loop.runs.parameters.resize(0, static_cast<Eigen::Index>(problem.prior.size()));
   loop.runs.coordinates.resize(0, q);
   for (;;) {
-    auto decision = DecideAdaptive(problem, loop.runs, loop.memory, options);
+    absl::StatusOr<AdaptiveDecision> decision = AdaptiveDecision{};
+    if (asynchronous && MayOverlap(loop.memory)) {
+      AdaptiveRuns seen = loop.runs;
+      for (std::size_t i = 0; i < seen.end.size(); ++i) {
+        if (seen.batch[i] + 1 == std::ssize(loop.memory)) seen.end[i] = RunEnd::kPending;
+      }
+      decision = DecideAdaptive(problem, seen, loop.memory, options);
+    }
+    if (!decision.ok() || decision->next.parameters.rows() == 0)
+      decision = DecideAdaptive(problem, loop.runs, loop.memory, options);
     if (!decision.ok()) {
       loop.decision.stage = AdaptiveStage::kRefused;
       loop.decision.reason = "error: " + std::string(decision.status().message());

@@ -58,9 +58,10 @@ std::vector<HeldParameter> HeldParametersOf(const Campaign& campaign) {
   std::vector<HeldParameter> held;
   for (const dem::UserEffect& effect : campaign.model.user_effects) {
     if (Acts(campaign, effect.info.name)) continue;
-    for (const dem::ParameterInfo& own : effect.info.parameters)
+    for (const dem::ParameterInfo& own : effect.info.parameters) {
       held.push_back({absl::StrCat(effect.info.name, ".", own.name), own.unit, own.null_value,
                       own.min, own.max});
+    }
   }
   return held;
 }

@@ -19,6 +19,7 @@ class AdaptiveEmulator final : public campaign::Method {
  public:
   std::string name() const override { return "adaptive_emulator"; }
   bool keeps_batches() const override { return true; }
+  bool chooses_while_running() const override { return asynchronous_; }
   bool needs_errors() const override { return true; }
   bool bounds_runs() const override { return false; }  // it would take a bound for a value
   int standard_iterations() const override { return 0; }
@@ -53,7 +54,8 @@ class AdaptiveEmulator final : public campaign::Method {
                   absl::StrCat("auto: ", standard.batch),
                   "adaptive_emulator: runs that are chosen together"},
                  {kAsynchronous, campaign::TrueOrFalse(), "false",
-                  "adaptive_emulator: false, decisions are taken on complete batches"},
+                  "adaptive_emulator: true, the next batch is chosen while one runs, from those "
+                  "before it, so that no core waits for the last run of a batch"},
              }}};
   }
 
@@ -68,10 +70,7 @@ class AdaptiveEmulator final : public campaign::Method {
     if (!is_auto) {
       options.batch = static_cast<int>(inference.Integer(kBatch).value_or(options.batch));
     }
-    if (inference.TrueOrFalse(kAsynchronous).value_or(false)) {
-      inference.Problem(kAsynchronous,
-                        "cannot be true: this build decides on complete batches alone");
-    }
+    read->asynchronous_ = inference.TrueOrFalse(kAsynchronous).value_or(false);
     for (const char* key : {"samples", "max_iterations"}) {
       if (inference.Has(key)) {
         inference.Problem(
@@ -119,11 +118,12 @@ class AdaptiveEmulator final : public campaign::Method {
 
   std::unique_ptr<planning::Planner> MakePlanner(
       const planning::Definition& definition) const override {
-    return MakeAdaptivePlanner(definition, options_);
+    return MakeAdaptivePlanner(definition, options_, asynchronous_);
   }
 
  private:
   inference::AdaptiveOptions options_;  // max_runs and batch
+  bool asynchronous_ = false;
 };
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "inference/numerics/weighted_moments.h"
 #include "server/campaign/model/word_table.h"
 #include "server/planning/json_vectors.h"
+#include "server/planning/plan_memory.h"
 #include "server/planning/scatter.h"
 
 namespace calib::methods {
@@ -86,6 +87,11 @@ Eigen::VectorXd Project(const Coordinates& coordinates, const Eigen::RowVectorXd
   return result;
 }
 
+/// The number of batches at which a decision that did not wait for the last found no runs.
+struct NoneBeforeTheLast final : planning::PlannerMemory {
+  std::size_t batches = 0;
+};
+
 struct Memory {
   inference::AdaptiveMemory of_decision;
   double expected_gain = 0;
@@ -95,17 +101,19 @@ std::string ToText(const Memory& memory) {
   return Json{{"stage", campaign::WordOf(kStageWords, memory.of_decision.stage)},
               {"mean", planning::VectorToJson(memory.of_decision.mean)},
               {"sd", planning::VectorToJson(memory.of_decision.sd)},
+              {"batches", memory.of_decision.batches},
               {"expected_gain", memory.expected_gain}}
       .dump();
 }
 
-absl::StatusOr<Memory> FromText(const std::string& text) {
+/// number: of the batch; without asynchronous decisions all before it had ended.
+absl::StatusOr<Memory> FromText(const std::string& text, int number) {
   try {
     const Json json = Json::parse(text);
     const auto stage = campaign::ValueOf(kStageWords, json.at("stage").get<std::string>());
     if (!stage) return absl::DataLossError("a stored batch is of a stage that nobody knows");
     return Memory{{*stage, planning::VectorFromJson(json.at("mean")),
-                   planning::VectorFromJson(json.at("sd"))},
+                   planning::VectorFromJson(json.at("sd")), json.value("batches", number)},
                   json.at("expected_gain").get<double>()};
   } catch (const Json::exception& error) {
     return absl::DataLossError(absl::StrCat("stored batch: ", error.what()));
@@ -114,10 +122,12 @@ absl::StatusOr<Memory> FromText(const std::string& text) {
 
 class AdaptivePlanner final : public planning::Planner {
  public:
-  AdaptivePlanner(const planning::Definition& definition, const inference::AdaptiveOptions& options)
+  AdaptivePlanner(const planning::Definition& definition, const inference::AdaptiveOptions& options,
+                  bool asynchronous)
       : definition_(definition),
         campaign_(definition.campaign),
         options_(options),
+        asynchronous_(asynchronous),
         coordinates_(MakeCoordinates(definition)) {
     options_.seed = campaign_.seed;
     for (const campaign::CalibratedParameter& p : campaign_.parameters) {
@@ -147,16 +157,10 @@ class AdaptivePlanner final : public planning::Planner {
 
   absl::StatusOr<planning::Outcome> Conclude(const planning::History& history,
                                              bool affordable) const override {
-    std::vector<Memory> memories;
-    for (const std::string& proposal : history.proposals) {
-      ASSIGN_OR_RETURN(auto memory, FromText(proposal));
-      memories.push_back(std::move(memory));
-    }
-    std::vector<inference::AdaptiveMemory> earlier;
-    for (const Memory& memory : memories) earlier.push_back(memory.of_decision);
-    const inference::AdaptiveRuns runs = RunsOf(history);
+    ASSIGN_OR_RETURN(const auto memories, MemoriesOf(history));
+    const inference::AdaptiveRuns runs = RunsOf(history, history.iterations.size());
     ASSIGN_OR_RETURN(const auto decision,
-                     inference::DecideAdaptive(problem_, runs, earlier, options_));
+                     inference::DecideAdaptive(problem_, runs, OfDecisions(memories), options_));
     if (decision.stage == AdaptiveStage::kRefused) {
       return absl::FailedPreconditionError(decision.reason);
     }
@@ -184,14 +188,64 @@ class AdaptivePlanner final : public planning::Planner {
     return outcome;
   }
 
+  absl::StatusOr<planning::Batch> More(const planning::History& history,
+                                       std::int64_t affordable) const override {
+    const std::size_t batches = history.iterations.size();
+    if (!asynchronous_ || !HasEnded(history, batches - 1)) return planning::Batch{};
+    ASSIGN_OR_RETURN(const auto memories, MemoriesOf(history));
+    const std::vector<inference::AdaptiveMemory> earlier = OfDecisions(memories);
+    // How many batches are known is the rule's, whatever else has arrived.
+    const auto decide = [&](std::size_t known) -> absl::StatusOr<planning::Batch> {
+      const inference::AdaptiveRuns runs = RunsOf(history, known);
+      ASSIGN_OR_RETURN(const auto decision,
+                       inference::DecideAdaptive(problem_, runs, earlier, options_));
+      if (decision.stage == AdaptiveStage::kRefused) {
+        return absl::FailedPreconditionError(decision.reason);
+      }
+      if (decision.next.parameters.rows() > affordable) return planning::Batch{};
+      return BatchOf(decision, static_cast<int>(batches), static_cast<int>(runs.rows()));
+    };
+    std::size_t& none_at = definition_.memory->Of<NoneBeforeTheLast>().batches;
+    if (inference::MayOverlap(earlier) && none_at != batches) {
+      auto batch = decide(batches - 1);
+      if (batch.ok() && batch->parameters.rows() > 0) return batch;
+      none_at = batches;
+    }
+    return HasEnded(history, batches) ? decide(batches) : planning::Batch{};
+  }
+
  private:
+  /// Whether all runs of the first `batches` have.
+  static bool HasEnded(const planning::History& history, std::size_t batches) {
+    for (std::size_t k = 0; k < batches; ++k) {
+      const std::vector<char>& ended = history.ended[k];
+      if (std::find(ended.begin(), ended.end(), 0) != ended.end()) return false;
+    }
+    return true;
+  }
+
+  static absl::StatusOr<std::vector<Memory>> MemoriesOf(const planning::History& history) {
+    std::vector<Memory> memories;
+    for (const std::string& proposal : history.proposals) {
+      ASSIGN_OR_RETURN(auto memory, FromText(proposal, static_cast<int>(memories.size())));
+      memories.push_back(std::move(memory));
+    }
+    return memories;
+  }
+
+  static std::vector<inference::AdaptiveMemory> OfDecisions(const std::vector<Memory>& memories) {
+    std::vector<inference::AdaptiveMemory> result;
+    for (const Memory& memory : memories) result.push_back(memory.of_decision);
+    return result;
+  }
+
   /// iteration: its number; made: runs before it.
   planning::Batch BatchOf(const inference::AdaptiveDecision& decision, int iteration,
                           int made) const {
     planning::Batch batch{
-        .proposal =
-            ToText({.of_decision = {decision.stage, decision.memory.mean, decision.memory.sd},
-                    .expected_gain = iteration == 0 ? 0 : decision.next.expected_gain}),
+        .proposal = ToText({.of_decision = {decision.stage, decision.memory.mean,
+                                            decision.memory.sd, decision.memory.batches},
+                            .expected_gain = iteration == 0 ? 0 : decision.next.expected_gain}),
         .parameters = decision.next.parameters,
         .stop_below = std::vector<double>(decision.next.packing.size(), store::kUnknown),
         .refused = {}};
@@ -201,7 +255,8 @@ class AdaptivePlanner final : public planning::Planner {
     return batch;
   }
 
-  inference::AdaptiveRuns RunsOf(const planning::History& history) const {
+  /// known: batches of which results are taken; runs of the others are pending.
+  inference::AdaptiveRuns RunsOf(const planning::History& history, std::size_t known) const {
     Index rows = 0;
     for (const inference::Iteration& batch : history.iterations) rows += batch.parameters.rows();
     inference::AdaptiveRuns runs;
@@ -215,6 +270,11 @@ class AdaptivePlanner final : public planning::Planner {
         runs.parameters.row(row) = batch.parameters.row(i);
         runs.packing.push_back(sample.stream.value_or(0) % problem_.packings);
         runs.batch.push_back(static_cast<int>(k));
+        if (k >= known) {
+          runs.coordinates.row(row).setConstant(planning::kNone);
+          runs.end.push_back(inference::RunEnd::kPending);
+          continue;
+        }
         const bool complete = batch.predictions.row(i).allFinite();
         runs.coordinates.row(row) =
             Project(coordinates_, complete ? batch.predictions.row(i) : history.stopped[k].row(i));
@@ -277,6 +337,7 @@ class AdaptivePlanner final : public planning::Planner {
   const planning::Definition& definition_;
   const campaign::Campaign& campaign_;
   inference::AdaptiveOptions options_;
+  bool asynchronous_;
   Coordinates coordinates_;
   inference::AdaptiveProblem problem_;
 };
@@ -284,8 +345,9 @@ class AdaptivePlanner final : public planning::Planner {
 }  // namespace
 
 std::unique_ptr<planning::Planner> MakeAdaptivePlanner(const planning::Definition& definition,
-                                                       const inference::AdaptiveOptions& options) {
-  return std::make_unique<AdaptivePlanner>(definition, options);
+                                                       const inference::AdaptiveOptions& options,
+                                                       bool asynchronous) {
+  return std::make_unique<AdaptivePlanner>(definition, options, asynchronous);
 }
 
 }  // namespace calib::methods

@@ -11,9 +11,11 @@
 
 namespace calib::methods {
 
-/// options: max_runs and batch; seed and names follow from the campaign. Keeps a reference to the
-/// definition.
+/// options: max_runs and batch; seed and names follow from the campaign. asynchronous: batches are
+/// chosen from those that have ended before the last, which runs meanwhile. Keeps a reference to
+/// the definition.
 std::unique_ptr<planning::Planner> MakeAdaptivePlanner(const planning::Definition& definition,
-                                                       const inference::AdaptiveOptions& options);
+                                                       const inference::AdaptiveOptions& options,
+                                                       bool asynchronous);
 
 }  // namespace calib::methods

@@ -83,6 +83,44 @@ TEST(AdaptiveCampaign, SameBitsWhateverGoesWrong) {
   }
 }
 
+constexpr const char* kAsynchronous = "  max_runs: 56\n  asynchronous: true\n";
+
+TEST(AsynchronousAdaptiveCampaign, HasTheNextBatchUnderWayBeforeOneHasEnded) {
+  // Of every batch one run takes twenty times as long as the others.
+  const auto seconds = [](int evaluation) { return evaluation % 6 == 0 ? 20.0 : 1.0; };
+  const auto busy = [&seconds](const std::string& name, const std::string& inference) {
+    SimulatedService service(name);
+    service.Submit(AdaptiveCampaignOf(inference));
+    const SimulatedService::Shift shift = service.RunTimed(6, seconds);
+    EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished);
+    EXPECT_EQ(PosteriorAtTheEnd(service).posterior_from(), "emulator");
+    return shift.computing / (6 * shift.elapsed);
+  };
+  const double alone = busy("adaptive_waits", "  max_runs: 56\n");
+  const double overlapping = busy("adaptive_overlaps", kAsynchronous);
+  EXPECT_GT(overlapping, 1.2 * alone);
+}
+
+TEST(AsynchronousAdaptiveCampaign, SameBitsWhateverGoesWrongAndWhoeverWorks) {
+  const auto campaign = AdaptiveCampaignOf(kAsynchronous, 4);
+  SimulatedService calm("asynchronous_calm");
+  calm.Submit(campaign);
+  calm.RunToEnd(1, true);
+  EXPECT_EQ(calm.Campaign().progress.state, store::CampaignState::kFinished);
+  for (const int workers : {1, 40}) {
+    SimulatedService timed("asynchronous_timed");
+    timed.Submit(campaign);
+    timed.RunTimed(workers, [](int evaluation) { return 1.0 + (evaluation * 7) % 5; });
+    EXPECT_EQ(timed.Fingerprint(), calm.Fingerprint()) << workers << " workers";
+  }
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService storm("asynchronous_storm");
+    storm.Submit(campaign);
+    storm.RunToEnd(seed, false);
+    EXPECT_EQ(storm.Fingerprint(), calm.Fingerprint()) << seed;
+  }
+}
+
 std::string FirstProblemOf(const testing::SmallCampaign& c) {
   const auto read = [&c](const std::string& path) -> absl::StatusOr<std::string> {
     const auto found = c.files.find(path);
@@ -101,9 +139,9 @@ TEST(AdaptiveCampaign, BadInputIsOneSentence) {
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  samples: 50\n")),
               HasSubstr("samples: is chosen by adaptive_emulator; max_runs bounds its runs"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  batch: many\n")), HasSubstr("batch: "));
-  EXPECT_EQ(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: false\n")), "");
-  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: true\n")),
-              HasSubstr("asynchronous: cannot be true: this build decides on complete batches"));
+  EXPECT_EQ(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: true\n")), "");
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: often\n")),
+              HasSubstr("asynchronous: "));
   auto inferred = AdaptiveCampaignOf("");
   inferred.yaml.replace(inferred.yaml.find("noise: given"), 12, "noise: inferred");
   EXPECT_THAT(FirstProblemOf(inferred), HasSubstr("needs the errors of the readings as they are"));

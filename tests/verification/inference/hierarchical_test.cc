@@ -74,9 +74,10 @@ struct Hierarchy {
   DataSet Data() const {
     DataSet data;
     for (int l = 0; l < labels; ++l) {
-      for (int i = 0; i < readings; ++i)
+      for (int i = 0; i < readings; ++i) {
         data.readings.push_back(
             {.experiment = l, .load_step = i, .value = values(l, i), .sd = noise});
+      }
     }
     return data;
   }

@@ -99,9 +99,10 @@ TEST(JsonText, EveryDoubleIsReadBackToTheSameBits) {
   std::mt19937_64 random(2);
   for (int k = 0; k < 200'000; ++k) {
     double value = std::bit_cast<double>(random());
-    if (k % 4 == 1)
+    if (k % 4 == 1) {
       value =
           std::trunc(std::ldexp(static_cast<double>(random()), -static_cast<int>(random() % 64)));
+    }
     if (k % 4 == 2) value = std::bit_cast<double>(random() & 0x800fffffffffffffULL);  // subnormal
     if (!std::isfinite(value)) continue;
     const std::string text = NumberText(value);

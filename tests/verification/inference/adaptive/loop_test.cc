@@ -138,13 +138,14 @@ struct Score {
 };
 
 std::vector<Score> ScoresOf(const std::function<Case(std::uint64_t)>& make, int d,
-                            const std::string& name, int seeds) {
+                            const std::string& name, int seeds, bool asynchronous = false) {
   std::vector<Score> scores;
   const int first = FromEnvironment("CALIB_FIRST_SEED", 1);
   for (int seed = first; seed < first + seeds; ++seed) {
     const Case one = make(static_cast<std::uint64_t>(seed));
     const AdaptiveLoop loop =
-        Calibrate(one.toy, {.max_runs = 25 * d, .seed = static_cast<std::uint64_t>(1000 + seed)});
+        Calibrate(one.toy, {.max_runs = 25 * d, .seed = static_cast<std::uint64_t>(1000 + seed)},
+                  {}, asynchronous);
     Score score{.runs = loop.runs.rows(), .stage = loop.decision.stage};
     if (loop.decision.posterior) {
       const AdaptivePosterior& p = *loop.decision.posterior;
@@ -220,6 +221,9 @@ TEST(AdaptiveLoop, LinearGaussian) {
   ExpectNear(ScoresOf(Linear(2), 2, "linear2", 2));
   ExpectNear(ScoresOf(Linear(4), 4, "linear4", 1));
 }
+TEST(AdaptiveLoop, LinearGaussianWhileABatchRuns) {
+  ExpectNear(ScoresOf(Linear(2), 2, "linear2 asynchronous", 2, true));
+}
 TEST(AdaptiveLoop, Ridge) { ExpectNear(ScoresOf(Ridge, 2, "ridge", 2)); }
 TEST(AdaptiveLoop, TwoModes) { ExpectNear(ScoresOf(TwoModes, 2, "modes", 2)); }
 TEST(AdaptiveLoop, EdgeOfThePrior) { ExpectNear(ScoresOf(Edge, 2, "edge", 2)); }
@@ -230,9 +234,10 @@ TEST(AdaptiveLoop, EdgeOfThePrior) { ExpectNear(ScoresOf(Edge, 2, "edge", 2)); }
 struct Least {
   int means, widths, evidence;
 };
-void ExpectMostMeet(const MakeCase& make, int d, const std::string& name, const Least& least) {
+void ExpectMostMeet(const MakeCase& make, int d, const std::string& name, const Least& least,
+                    bool asynchronous = false) {
   const int seeds = FromEnvironment("CALIB_SEEDS", 20);
-  const std::vector<Score> scores = ScoresOf(make, d, name, seeds);
+  const std::vector<Score> scores = ScoresOf(make, d, name, seeds, asynchronous);
   int means = 0, widths = 0, evidence = 0;
   for (const Score& score : scores) {
     means += score.MeetsMean() ? 1 : 0;
@@ -262,6 +267,16 @@ TEST(AdaptiveLoopSlow, TwoModes) {
 }
 TEST(AdaptiveLoopSlow, EdgeOfThePrior) {
   ExpectMostMeet(Edge, 2, "edge", {.means = 8, .widths = 15, .evidence = 14});
+}
+// Batches chosen before the last has ended: the same limits.
+TEST(AdaptiveLoopSlow, WhileABatchRuns) {
+  const auto meet = [](const MakeCase& make, const std::string& name, const Least& least) {
+    ExpectMostMeet(make, 2, name + " asynchronous", least, true);
+  };
+  meet(Linear(2), "linear2", {.means = 7, .widths = 17, .evidence = 13});
+  meet(Ridge, "ridge", {.means = 10, .widths = 13, .evidence = 13});
+  meet(TwoModes, "modes", {.means = 7, .widths = 14, .evidence = 13});
+  meet(Edge, "edge", {.means = 8, .widths = 15, .evidence = 14});
 }
 // A jump is not seen as such: the emulator smooths it, which its stated errors do not hold.
 TEST(AdaptiveLoopSlow, Jump) {
