@@ -221,13 +221,22 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
     }
     AdaptiveDecision result;
     const int first = FirstRunsOf(d, options);
-    result.next = FirstRuns(problem, first, std::min(options.repeats, first / 3), options.seed);
+    const AdaptiveBatch& given = options.given;
+    AdaptiveBatch fill =
+        FirstRuns(problem, first, std::min(options.repeats, first / 3), options.seed, given);
+    const Index count = given.parameters.rows();
+    result.next.parameters.resize(count + fill.parameters.rows(), d);
+    if (count > 0) result.next.parameters.topRows(count) = given.parameters;
+    result.next.parameters.bottomRows(fill.parameters.rows()) = fill.parameters;
+    result.next.packing = given.packing;
+    result.next.packing.insert(result.next.packing.end(), fill.packing.begin(), fill.packing.end());
     return result;
   }
 
   const auto complete =
       static_cast<Index>(std::count(runs.end.begin(), runs.end.end(), RunEnd::kComplete));
-  const auto left = static_cast<int>(options.max_runs - asked_for.rows());
+  const auto left =
+      static_cast<int>(options.max_runs + options.given.parameters.rows() - asked_for.rows());
   if (complete < ResponseEmulator::LeastRuns(d)) {
     const std::string found =
         complete == 0 ? absl::StrCat("None of ", runs.rows(), " runs is complete")

@@ -17,7 +17,7 @@ namespace calib::inference {
 
 /// Options of an adaptive calibration.
 struct AdaptiveOptions {
-  int max_runs = 150;  ///< of all batches together, >= 1
+  int max_runs = 150;  ///< of all batches together, those given aside, >= 1
   int batch = 6;       ///< runs of a batch, >= 1
   int explore = 1;     ///< BatchOptions::explore
   int first_per_parameter =
@@ -31,6 +31,7 @@ struct AdaptiveOptions {
   AdaptiveSamplingOptions sampling = {};  ///< `seed` and `number` are set by DecideAdaptive
   std::uint64_t seed = 0;
   std::vector<std::string> names = {};  ///< d, of the parameters in sentences; or none
+  AdaptiveBatch given = {};  ///< runs of the first batch that max_runs does not count: FirstRuns
   absl::Status Validate() const;  ///< INVALID_ARGUMENT: field, what was found, what is allowed
 };
 

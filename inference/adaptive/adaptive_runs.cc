@@ -40,20 +40,24 @@ AdaptiveRuns AdaptiveRuns::Before(int last) const {
           .coordinates = coordinates.topRows(n)};
 }
 
-AdaptiveRuns AdaptiveRuns::Ended() const {
-  std::vector<Index> kept;
-  AdaptiveRuns result;
-  for (Index i = 0; i < rows(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    if (end[at] == RunEnd::kPending) continue;
-    kept.push_back(i);
+AdaptiveRuns AdaptiveRuns::Only(const std::vector<Index>& numbers) const {
+  AdaptiveRuns result{.parameters = parameters(numbers, Eigen::all),
+                      .coordinates = coordinates(numbers, Eigen::all)};
+  for (const Index number : numbers) {
+    const auto at = static_cast<std::size_t>(number);
     result.packing.push_back(packing[at]);
     result.batch.push_back(batch[at]);
     result.end.push_back(end[at]);
   }
-  result.parameters = parameters(kept, Eigen::all);
-  result.coordinates = coordinates(kept, Eigen::all);
   return result;
+}
+
+AdaptiveRuns AdaptiveRuns::Ended() const {
+  std::vector<Index> ended;
+  for (Index i = 0; i < rows(); ++i) {
+    if (end[static_cast<std::size_t>(i)] != RunEnd::kPending) ended.push_back(i);
+  }
+  return Only(ended);
 }
 
 absl::Status AdaptiveRuns::Validate(const AdaptiveProblem& problem) const {

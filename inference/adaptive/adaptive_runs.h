@@ -41,6 +41,8 @@ struct AdaptiveRuns {
   Eigen::Index rows() const { return parameters.rows(); }
   /// Those of batches before this one.
   AdaptiveRuns Before(int last) const;
+  /// Those with these numbers, which ascend.
+  AdaptiveRuns Only(const std::vector<Eigen::Index>& numbers) const;
   /// Those that are not pending.
   AdaptiveRuns Ended() const;
   /// INVALID_ARGUMENT: what does not fit the problem.

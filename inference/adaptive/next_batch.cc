@@ -157,6 +157,28 @@ class ExpectedVariance {
   std::vector<Eigen::MatrixXd> with_points_, between_;
 };
 
+// Rows of the points, standardised, for which none of the given stands: each stands for the one
+// that is nearest to it, if no other point is nearer to that.
+std::vector<Index> NotStoodFor(const Eigen::MatrixXd& points, const Eigen::MatrixXd& given) {
+  const Index n = points.rows();
+  Eigen::VectorXd spacing = Eigen::VectorXd::Constant(n, kInfinity);
+  for (Index i = 0; given.rows() > 0 && i < n; ++i) {
+    for (Index j = 0; j < n; ++j)
+      if (j != i) spacing[i] = std::min(spacing[i], (points.row(i) - points.row(j)).squaredNorm());
+  }
+  std::vector<bool> stood_for(static_cast<std::size_t>(n), false);
+  for (Index g = 0; g < given.rows(); ++g) {
+    Index nearest = 0;
+    const double distance =
+        (points.rowwise() - given.row(g)).rowwise().squaredNorm().minCoeff(&nearest);
+    if (distance <= spacing[nearest]) stood_for[static_cast<std::size_t>(nearest)] = true;
+  }
+  std::vector<Index> kept;
+  for (Index i = 0; i < n; ++i)
+    if (!stood_for[static_cast<std::size_t>(i)]) kept.push_back(i);
+  return kept;
+}
+
 std::vector<Index> Pending(const AdaptiveRuns& runs) {
   std::vector<Index> pending;
   for (Index i = 0; i < runs.rows(); ++i) {
@@ -186,8 +208,15 @@ Eigen::RowVectorXd Unexplored(const Eigen::MatrixXd& places, const Eigen::Vector
 
 }  // namespace
 
-AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, std::uint64_t seed) {
-  AdaptiveBatch result{.parameters = OfPrior(problem.prior, runs, seed), .packing = {}};
+AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, std::uint64_t seed,
+                        const AdaptiveBatch& given) {
+  const Eigen::MatrixXd points = OfPrior(problem.prior, runs, seed);
+  std::vector<Index> kept = NotStoodFor(StandardRows(problem.prior, points.topRows(runs - repeats)),
+                                        StandardRows(problem.prior, given.parameters));
+  const auto fill = static_cast<int>(kept.size());
+  for (int row = runs - repeats; row < runs; ++row) kept.push_back(row);
+  runs = fill + repeats;
+  AdaptiveBatch result{.parameters = points(kept, Eigen::all), .packing = {}};
   const int block = problem.packings;
   for (int first = 0; first < runs; first += block) {
     const std::vector<Index> order =
@@ -199,11 +228,13 @@ AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, s
       result.packing.push_back(static_cast<int>(order[static_cast<std::size_t>(i)]));
   }
   for (int r = 0; r < repeats; ++r) {
-    const int row = runs - repeats + r;
+    const int row = fill + r;
     const auto at = static_cast<std::size_t>(row);
-    Eigen::VectorXd x = result.parameters.row(r).transpose();
+    const AdaptiveBatch& of = r < fill ? result : given;
+    const int repeated = r < fill ? r : r - fill;
+    Eigen::VectorXd x = of.parameters.row(repeated).transpose();
     if (problem.packings > 1) {
-      if (result.packing[at] == result.packing[static_cast<std::size_t>(r)])
+      if (result.packing[at] == of.packing[static_cast<std::size_t>(repeated)])
         result.packing[at] = (result.packing[at] + 1) % problem.packings;
     } else {
       Eigen::VectorXd s = problem.prior.ToStandard(x);

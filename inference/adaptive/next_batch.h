@@ -31,8 +31,10 @@ struct BatchOptions {
 /// `runs` points that fill the prior, a scrambled Sobol sequence, and `repeats` <= runs of the
 /// first of them again on another packing (with one packing: with parameters moved by a millionth),
 /// which tell scatter from what an emulator misses. Packings are balanced, their order by chance in
-/// blocks. Deterministic.
-AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, std::uint64_t seed);
+/// blocks. given: runs that are made beside them; each stands for the point nearest to it, which is
+/// left out, if that is no farther from it than from the next point. Deterministic.
+AdaptiveBatch FirstRuns(const AdaptiveProblem& problem, int runs, int repeats, std::uint64_t seed,
+                        const AdaptiveBatch& given = {});
 
 /// The batch, one run after the other, after which the integral over the prior's cube of the
 /// variance of the likelihood is expected to be least,

@@ -3,10 +3,12 @@
 #include <iostream>
 #include <memory>
 
+#include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
+#include "server/messages/read_words.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
@@ -19,7 +21,15 @@ Verb ControlVerb(const std::string& name, const std::string& description, Contro
     if (common.json) {
       std::cout << report::StatusJson(status);
     } else {
-      std::cout << status.campaign() << " is " << status.state() << ".\n";
+      const auto state = messages::StateOf(status);
+      const bool goes_on =
+          state == campaign::CampaignState::kQueued || state == campaign::CampaignState::kRunning;
+      std::cout << status.campaign() << " is " << status.state()
+                << (goes_on && !session->is_guest()
+                        ? absl::StrCat("; nobody serves ", common.server.state,
+                                       " now: it goes on with `calibctl watch ", status.campaign(),
+                                       " --state ", common.server.state, " --workers N`.\n")
+                        : ".\n");
     }
     return kDone;
   };

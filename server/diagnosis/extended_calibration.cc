@@ -154,6 +154,10 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
   int samples = campaign.samples;
   int iterations = campaign.max_iterations;
   int first = 0;  // runs that come first, beside those of the design
+  const bool learns = campaign.method->weighs_samples() || campaign.method->takes_rows();
+  if (learns && options.design != nullptr)
+    plan.given = RunsOfModel(parent, *options.design, model.effects);
+  if (!plan.given.empty()) plan.method = campaign.method->extended_by();
   if (campaign.method->weighs_samples()) {
     const PriorsInExtension priors(parent, model.effects);
     samples = kPerParameter * static_cast<int>(priors.size());
@@ -161,7 +165,6 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
     plan.method = campaign.method->extended_by();
     plan.samples = samples;
     plan.iterations = iterations;
-    if (options.design != nullptr) plan.given = RunsOfModel(parent, *options.design, model.effects);
     for (auto& draw : WiderDraws(priors, model, samples)) {
       plan.given.push_back(
           {.like = static_cast<int>(plan.given.size()), .values = std::move(draw)});
@@ -172,7 +175,8 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
   const auto fitted =
       std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
                     [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
-  const std::int64_t least = static_cast<std::int64_t>(std::max(first, samples)) * fitted;
+  if (!campaign.method->weighs_samples()) first = campaign.method->FirstBatch(campaign);
+  const std::int64_t least = static_cast<std::int64_t>(first) * fitted;
   if (budget && *budget < least) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "an iteration takes ", least, " model evaluations, and ", *budget, " are left"));

@@ -45,8 +45,8 @@ inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 /// Likewise when they are the best estimate on every packing, one sample each.
 inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
-/// Runs that a filter learns from beside its samples: the first of its first iteration. They were
-/// drawn from no proposal and have no weight.
+/// Runs that a method learns from beside its own: the first of its first iteration. They were drawn
+/// from no proposal and have no weight.
 Eigen::Index GivenRuns(const campaign::Campaign& campaign);
 /// Samples of an iteration at most, given runs among them: store::NewCampaign::samples.
 int LargestIteration(const campaign::Campaign& campaign);

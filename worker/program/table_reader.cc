@@ -146,6 +146,7 @@ void TableReader::Row(std::string_view line, bool may_be_cut) {
     return;
   }
   std::vector<JsonMember> said;
+  said.reserve(cells.size());
   for (int k = 0; k < table_.columns_size(); ++k) {
     said.push_back(MemberOf(table_.columns(k), cells[columns_[static_cast<std::size_t>(k)]]));
   }

@@ -63,16 +63,22 @@ YamlNode Rows(const Derivation& derivation) {
   return YamlList(std::move(rows));
 }
 
-// The samples that a method starts from may grow with the parameters.
-void RaiseSamples(const MethodList& methods, YamlNode& root) {
+// The runs that a method asks for may grow with the parameters.
+void RaiseRuns(const MethodList& methods, YamlNode& root) {
   YamlNode& inference = YamlAt(root, "inference");
   const YamlNode* method = YamlFind(inference, "method");
-  const YamlNode* samples = YamlFind(inference, "samples");
-  const auto named = method != nullptr ? methods.Find(method->scalar) : nullptr;
-  int given = 0;
-  if (named == nullptr || samples == nullptr || !absl::SimpleAtoi(samples->scalar, &given)) return;
-  const int fewest = named->fewest_samples(YamlAt(root, "parameters").entries.size());
-  if (given < fewest) YamlAt(inference, "samples") = YamlScalar(absl::StrCat(fewest));
+  const auto named = method != nullptr ? methods.Find(method->scalar) : methods.standard();
+  if (named == nullptr) return;
+  const auto said = [&inference](const std::string& key) -> std::optional<int> {
+    const YamlNode* node = YamlFind(inference, key);
+    int number = 0;
+    if (node == nullptr || !absl::SimpleAtoi(node->scalar, &number)) return std::nullopt;
+    return number;
+  };
+  const LeastRuns runs = named->least_runs(YamlAt(root, "parameters").entries.size(), said);
+  const bool is_word = YamlFind(inference, runs.key) != nullptr && !said(runs.key);
+  if (is_word || said(runs.key).value_or(runs.standard) >= runs.least) return;
+  YamlAt(inference, runs.key) = YamlScalar(absl::StrCat(runs.least));
 }
 
 // Runs that infer nothing may be of other observables than the groups name.
@@ -111,7 +117,7 @@ void ChangeInference(const MethodList& methods, const Derivation& derivation, Ya
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
   }
   if (!derivation.rows.empty()) YamlAt(inference, "rows") = Rows(derivation);
-  if (!derivation.parameters.empty()) RaiseSamples(methods, root);
+  if (!derivation.parameters.empty()) RaiseRuns(methods, root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
   }

@@ -11,6 +11,12 @@ namespace calib::campaign {
 
 int Method::fewest_samples(std::size_t /*parameters*/) const { return 2; }
 
+LeastRuns Method::least_runs(
+    std::size_t parameters,
+    const std::function<std::optional<int>(const std::string&)>& /*said*/) const {
+  return {.key = "samples", .least = fewest_samples(parameters), .standard = Campaign{}.samples};
+}
+
 int Method::MostBatches(const Campaign& campaign) const {
   return RunsRowsOnly(*this) || campaign.precomputed ? 1 : campaign.max_iterations;
 }

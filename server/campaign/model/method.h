@@ -2,7 +2,9 @@
 // A calibration method as everything outside of its own room (server/methods) sees it.
 
 #include <cstddef>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +32,14 @@ struct MethodInWords {
   std::string name;                     ///< empty: nothing was inferred
   std::vector<std::string> references;  ///< whole entries of a list
   std::string detail;                   ///< ", 4 iterations of 64 samples"
+};
+
+/// What a file says at least of its runs: a key of `inference`, and the number that stands for it
+/// where it is not there.
+struct LeastRuns {
+  std::string key;
+  int least = 0;
+  int standard = 0;
 };
 
 /// A method with its options. Immutable once read; thread-safe.
@@ -67,6 +77,10 @@ class Method {
   virtual std::string extended_by() const { return name(); }
   /// Of an iteration, for this many parameters.
   virtual int fewest_samples(std::size_t parameters) const;
+  /// For this many parameters. said: what the file says of another key, where it is a number.
+  virtual LeastRuns least_runs(
+      std::size_t parameters,
+      const std::function<std::optional<int>(const std::string&)>& said) const;
   /// Iterations where the file does not say; 0: it decides itself.
   virtual int standard_iterations() const { return 4; }
 

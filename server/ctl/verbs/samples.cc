@@ -4,12 +4,14 @@
 #include <string>
 
 #include "calib/return_if_error.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/client/documents.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
+#include "server/messages/read_words.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
@@ -18,9 +20,35 @@ namespace {
 
 struct SamplesOptions {
   std::string campaign;
+  bool rows = false;
 };
 
-void Declare(OptionList& list, SamplesOptions& options) { list.Campaign(options.campaign); }
+void Declare(OptionList& list, SamplesOptions& options) {
+  list.Campaign(options.campaign);
+  list.Flag(
+      "--rows", options.rows,
+      "its finished runs as `rows` for `inference` of another campaign file, which takes them "
+      "over without running them again");
+}
+
+// Numbers of a campaign's own units, with every digit: the runs are known by them.
+std::string RowsOf(const campaign::Campaign& campaign, const std::vector<v1::Sample>& samples) {
+  std::vector<campaign::YamlNode> rows;
+  for (const v1::Sample& sample : samples) {
+    if (messages::StatusOf(sample) != campaign::EvaluationStatus::kFinished ||
+        messages::PurposeOf(sample) != campaign::SamplePurpose::kEnsemble)
+      continue;
+    const int stream = sample.has_stream() ? sample.stream() : sample.index();
+    campaign::YamlNode row =
+        campaign::YamlMap({{"like", campaign::YamlScalar(std::to_string(stream))}});
+    for (int k = 0; k < sample.parameters_size(); ++k) {
+      const std::string& name = campaign.parameters[static_cast<std::size_t>(k)].name;
+      campaign::YamlAt(row, name) = campaign::YamlNumber(sample.parameters(k));
+    }
+    rows.push_back(std::move(row));
+  }
+  return campaign::ToYaml(campaign::YamlMap({{"rows", campaign::YamlList(std::move(rows))}}));
+}
 
 absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
@@ -33,6 +61,10 @@ absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& o
   ASSIGN_OR_RETURN(const auto samples, client.GetSamples(options.campaign));
   ASSIGN_OR_RETURN(const auto source, client.GetSource(options.campaign));
   ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(client, source));
+  if (options.rows) {
+    std::cout << RowsOf(campaign, samples);
+    return kDone;
+  }
   std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     columns.push_back(parameter.name);

@@ -24,23 +24,41 @@ class AdaptiveEmulator final : public campaign::Method {
   bool bounds_runs() const override { return false; }  // it would take a bound for a value
   int standard_iterations() const override { return 0; }
   bool takes_first_proposal() const override { return false; }  // first runs fill the prior
+  bool takes_rows() const override { return true; }
+  bool takes_made_runs() const override { return true; }
 
   bool batches_vary() const override { return true; }
 
   int FirstBatch(const campaign::Campaign& campaign) const override {
-    return inference::FirstRunsOf(static_cast<Eigen::Index>(campaign.parameters.size()), options_);
+    return GivenBeside(campaign) +
+           inference::FirstRunsOf(static_cast<Eigen::Index>(campaign.parameters.size()), options_);
   }
   std::string RunsInWords(const campaign::Campaign& campaign) const override {
-    return absl::StrCat(FirstBatch(campaign), " runs that fill the prior, then batches of ",
-                        options_.batch, ", at most ", options_.max_runs, " runs in all");
+    const int given = GivenBeside(campaign);
+    return absl::StrCat(given > 0 ? absl::StrCat(given, " rows given, at most ") : "",
+                        FirstBatch(campaign) - given, " runs that fill the prior, then batches of ",
+                        options_.batch, ", at most ", options_.max_runs,
+                        given > 0 ? " runs beside the rows" : " runs in all");
   }
   int LaterBatch(const campaign::Campaign& /*campaign*/) const override {
     return std::max(options_.batch, options_.verify);
   }
   int MostBatches(const campaign::Campaign& campaign) const override {
-    const int later = options_.max_runs - FirstBatch(campaign);
+    if (campaign.precomputed) return 1;
+    const int later = options_.max_runs - (FirstBatch(campaign) - GivenBeside(campaign));
     const int least = std::min(options_.batch, options_.verify);
     return 1 + (std::max(0, later) + least - 1) / least;
+  }
+
+  campaign::LeastRuns least_runs(
+      std::size_t parameters,
+      const std::function<std::optional<int>(const std::string&)>& said) const override {
+    inference::AdaptiveOptions options;
+    const int standard = options.max_runs;
+    options.batch = said(kBatch).value_or(options.batch);
+    return {.key = kMaxRuns,
+            .least = inference::LeastMaxRuns(static_cast<Eigen::Index>(parameters), options),
+            .standard = standard};
   }
 
   std::vector<campaign::Section> Keys() const override {
@@ -53,6 +71,8 @@ class AdaptiveEmulator final : public campaign::Method {
                  {kBatch, campaign::AnyOf({campaign::Whole(1, 1000), campaign::OneWord({"auto"})}),
                   absl::StrCat("auto: ", standard.batch),
                   "adaptive_emulator: runs that are chosen together"},
+                 {"rows", campaign::ListOf(campaign::MapOf("row")), "none",
+                  "adaptive_emulator: runs of the first batch that max_runs does not count"},
                  {kAsynchronous, campaign::TrueOrFalse(), "false",
                   "adaptive_emulator: true, the next batch is chosen while one runs, from those "
                   "before it, so that no core waits for the last run of a batch"},
@@ -83,7 +103,7 @@ class AdaptiveEmulator final : public campaign::Method {
                                                "write noise: given, or take tmcmc"));
     }
     // The largest batch is the first, which the parameters decide.
-    campaign.samples = options.max_runs;
+    if (!campaign.precomputed) campaign.samples = options.max_runs;
     // Its runs are spread over the packings, so that it knows what these differ by.
     if (!campaign.replicates) campaign.replicates = 0;
     return read;
@@ -93,7 +113,7 @@ class AdaptiveEmulator final : public campaign::Method {
              const campaign::Campaign& campaign) const override {
     const auto parameters = static_cast<Eigen::Index>(campaign.parameters.size());
     const int least = inference::LeastMaxRuns(parameters, options_);
-    if (parameters > 0 && options_.max_runs < least) {
+    if (!campaign.precomputed && parameters > 0 && options_.max_runs < least) {
       inference.Problem(
           kMaxRuns,
           absl::StrCat("is ", options_.max_runs, ", and ", parameters, " parameters take ", least,
@@ -122,6 +142,10 @@ class AdaptiveEmulator final : public campaign::Method {
   }
 
  private:
+  static int GivenBeside(const campaign::Campaign& campaign) {
+    return campaign.table ? static_cast<int>(campaign.table->parameters.rows()) : 0;
+  }
+
   inference::AdaptiveOptions options_;  // max_runs and batch
   bool asynchronous_ = false;
 };

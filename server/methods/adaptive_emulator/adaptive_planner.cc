@@ -145,9 +145,23 @@ class AdaptivePlanner final : public planning::Planner {
     problem_.share = planning::LargestScatterShare(campaign_);
     problem_.packings =
         static_cast<int>(std::max<std::size_t>(1, campaign::PackingsOfAll(campaign_)));
+    if (planning::GivenRuns(campaign_) == 0) return;
+    options_.given.parameters = campaign_.table->parameters;
+    for (const int stream : campaign_.table->like) {
+      options_.given.packing.push_back(stream % problem_.packings);
+      first_round_ = std::max(first_round_, stream / problem_.packings + 1);
+    }
   }
 
   absl::StatusOr<planning::Batch> First() const override {
+    if (campaign_.precomputed) {
+      const Eigen::MatrixXd& rows = campaign_.precomputed->parameters;
+      return planning::Batch{
+          .proposal = ToText({}),
+          .parameters = rows,
+          .stop_below = std::vector<double>(static_cast<std::size_t>(rows.rows()), store::kUnknown),
+          .refused = {}};
+    }
     ASSIGN_OR_RETURN(const auto decision, inference::DecideAdaptive(problem_, {}, {}, options_));
     if (decision.stage == AdaptiveStage::kRefused) {
       return absl::FailedPreconditionError(decision.reason);
@@ -159,6 +173,9 @@ class AdaptivePlanner final : public planning::Planner {
                                              bool affordable) const override {
     ASSIGN_OR_RETURN(const auto memories, MemoriesOf(history));
     const inference::AdaptiveRuns runs = RunsOf(history, history.iterations.size());
+    if (runs.rows() == 0) {
+      return absl::FailedPreconditionError("no row of the tables lies within the priors");
+    }
     ASSIGN_OR_RETURN(const auto decision,
                      inference::DecideAdaptive(problem_, runs, OfDecisions(memories), options_));
     if (decision.stage == AdaptiveStage::kRefused) {
@@ -175,15 +192,17 @@ class AdaptivePlanner final : public planning::Planner {
           {.runs = static_cast<int>(history.iterations[k].parameters.rows()),
            .expected_gain = memories[k].expected_gain});
     }
-    const bool goes_on = decision.next.parameters.rows() > 0;
+    const bool goes_on = decision.next.parameters.rows() > 0 && !campaign_.precomputed;
     if (goes_on && affordable) {
       outcome.next = BatchOf(decision, static_cast<int>(history.iterations.size()),
                              static_cast<int>(runs.rows()));
       return outcome;
     }
-    if (!decision.reason.empty()) outcome.answer.warnings.push_back(decision.reason);
+    const bool tells = !campaign_.precomputed && !decision.reason.empty();
+    if (tells) outcome.answer.warnings.push_back(decision.reason);
     planning::AskEmulator(definition_, history.iterations, outcome.answer);
-    outcome.converged = decision.stage == AdaptiveStage::kConverged &&
+    // Of runs that were made before there are no more.
+    outcome.converged = (decision.stage == AdaptiveStage::kConverged || campaign_.precomputed) &&
                         outcome.answer.FromEmulator() && Agree(*decision.posterior, outcome.answer);
     return outcome;
   }
@@ -249,8 +268,11 @@ class AdaptivePlanner final : public planning::Planner {
         .parameters = decision.next.parameters,
         .stop_below = std::vector<double>(decision.next.packing.size(), store::kUnknown),
         .refused = {}};
-    for (const int packing : decision.next.packing) {
-      batch.streams.push_back(problem_.packings * made++ + packing);
+    const bool begins = iteration == 0 && planning::GivenRuns(campaign_) > 0;
+    if (begins) batch.streams = campaign_.table->like;
+    for (std::size_t i = batch.streams.size(); i < decision.next.packing.size(); ++i) {
+      const int round = first_round_ + made + static_cast<int>(i);
+      batch.streams.push_back(problem_.packings * round + decision.next.packing[i]);
     }
     return batch;
   }
@@ -262,12 +284,14 @@ class AdaptivePlanner final : public planning::Planner {
     inference::AdaptiveRuns runs;
     runs.parameters.resize(rows, static_cast<Index>(problem_.prior.size()));
     runs.coordinates.resize(rows, problem_.measured.size());
+    std::vector<Index> inside;  // rows made elsewhere may lie anywhere
     Index row = 0;
     for (std::size_t k = 0; k < history.iterations.size(); ++k) {
       const inference::Iteration& batch = history.iterations[k];
       for (Index i = 0; i < batch.parameters.rows(); ++i, ++row) {
         const store::SampleRecord& sample = history.samples[static_cast<std::size_t>(row)];
         runs.parameters.row(row) = batch.parameters.row(i);
+        if (problem_.prior.InSupport(batch.parameters.row(i).transpose())) inside.push_back(row);
         runs.packing.push_back(sample.stream.value_or(0) % problem_.packings);
         runs.batch.push_back(static_cast<int>(k));
         if (k >= known) {
@@ -285,7 +309,7 @@ class AdaptivePlanner final : public planning::Planner {
                                : inference::RunEnd::kDiverged);
       }
     }
-    return runs;
+    return runs.Only(inside);
   }
 
   /// What is known without widths: the most likely run, and where the posterior lies.
@@ -338,6 +362,7 @@ class AdaptivePlanner final : public planning::Planner {
   const campaign::Campaign& campaign_;
   inference::AdaptiveOptions options_;
   bool asynchronous_;
+  int first_round_ = 0;  // of streams, behind those that are given
   Coordinates coordinates_;
   inference::AdaptiveProblem problem_;
 };

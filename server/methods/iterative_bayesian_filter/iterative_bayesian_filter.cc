@@ -24,8 +24,9 @@ class IterativeBayesianFilter final : public Filter {
     std::vector<campaign::Section> sections = Filter::Keys();
     sections.front().keys.push_back(
         {kFreeze, campaign::MapOf(kFreeze), "nothing", "iterative filter: what iterations hold"});
-    sections.front().keys.push_back({"rows", campaign::ListOf(campaign::MapOf("row")), "none",
-                                     "table, design, iterative filter: runs to be made"});
+    sections.front().keys.push_back(
+        {"rows", campaign::ListOf(campaign::MapOf("row")), "none",
+         "table, design, iterative filter, adaptive_emulator: runs to be made"});
     sections.push_back({kFreeze,
                         "inference.freeze",
                         {{"ITERATION", campaign::OneOrMore(campaign::Text()), "",

@@ -183,7 +183,11 @@ TEST_F(Calibctl, SubmittedWorkWaitsForWorkers) {
   EXPECT_EQ(Call("show c1 --state s --json").json()["state"], "paused");
   EXPECT_EQ(Call("posterior c1 --state s").code, 1);  // nothing to tell yet
   EXPECT_EQ(Call("report c1 --state s -o r.html").code, 0);
-  EXPECT_EQ(Call("resume c1 --state s").code, 0);
+  const Answer resumed = Call("resume c1 --state s");
+  EXPECT_EQ(resumed.code, 0);
+  EXPECT_EQ(resumed.out,
+            "c1 is running; nobody serves s now: it goes on with `calibctl watch c1 --state s "
+            "--workers N`.\n");
   const Answer watched = Call("watch c1 --state s --workers 2");
   EXPECT_EQ(watched.code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("c1 is finished"));

@@ -145,6 +145,26 @@ TEST_F(RunTables, AnEffectThatTheirRowsHoldIsNamedAddedAndJudgedWithoutARun) {
       << other.err;
 }
 
+TEST_F(RunTables, AnAdaptiveCalibrationTakesThemAsAllThereIs) {
+  WriteTables();
+  Measure({.modulus = 0.8e9, .friction = 0.5, .rolling = 0, .bonds = 0});
+  std::string text = Campaign();
+  text.replace(text.find("iterative_bayesian_filter"), 25, "adaptive_emulator");
+  Write("adaptive.yaml", text);
+  const Answer run = Call("run adaptive.yaml --state s --json");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const Json posterior = run.json();
+  EXPECT_EQ(posterior["posterior_from"], "emulator");
+  EXPECT_TRUE(posterior["converged"]) << posterior["warnings"];
+  EXPECT_EQ(posterior["model_evaluations"], 0);
+  ASSERT_EQ(posterior["batches"].size(), 1U);
+  const std::map<std::string, double> truth = {{"young_modulus", 0.8e9}, {"friction", 0.5}};
+  for (const auto& [name, value] : truth) {
+    const Json& parameter = posterior["parameters"][name];
+    EXPECT_NEAR(parameter["mean"].get<double>(), value, 3 * parameter["sd"].get<double>()) << name;
+  }
+}
+
 TEST_F(RunTables, OfARightModelNoneIsNamed) {
   const Json diagnosis = DiagnosisOf({.modulus = 0.8e9, .friction = 0.5, .rolling = 0, .bonds = 0});
   EXPECT_EQ(diagnosis["verdict"], "adequate") << diagnosis["sentence"];

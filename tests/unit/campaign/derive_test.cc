@@ -112,6 +112,24 @@ TEST(Derive, AnExtensionOfOneIterationMayHaveMore) {
       << *text;
 }
 
+TEST(Derive, MoreParametersMayTakeMoreRuns) {
+  const auto derived = [](const std::string& inference) {
+    const auto text = Derive(
+        methods::All(), "name: a\nparameters: {a: {}, b: {}}\ninference: {" + inference + "}\n",
+        {.name = "b",
+         .lineage = {.parent = "c1", .purpose = "extension"},
+         .parameters = {{"e.x", {"uniform", 0, 1}}, {"e.y", {"uniform", 0, 1}}}});
+    return text.ok() ? *text : std::string(text.status().message());
+  };
+  const std::string adaptive = "method: adaptive_emulator";
+  // Forty fill the prior, two batches of 6 and 6 that judge.
+  EXPECT_THAT(derived(adaptive + ", max_runs: 38"), HasSubstr(adaptive + ", max_runs: 58}"));
+  EXPECT_THAT(derived(adaptive + ", max_runs: 60, batch: 20"), HasSubstr("max_runs: 86, batch"));
+  EXPECT_THAT(derived(adaptive + ", max_runs: 60, batch: auto"), HasSubstr("max_runs: 60"));
+  EXPECT_THAT(derived(adaptive), HasSubstr(adaptive + "}"));
+  EXPECT_THAT(derived("method: surrogate_msrs, samples: 5"), HasSubstr("samples: 9}"));
+}
+
 // Runs of a table infer nothing, and may be of tests that read other observables.
 TEST(Derive, ATableHasNoGroupsOfNoise) {
   for (const auto& [noise, left] : std::vector<std::pair<std::string, std::string>>{

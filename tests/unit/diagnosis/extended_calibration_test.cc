@@ -130,6 +130,20 @@ TEST(ExtendedCalibration, RunsOfTheModelAreTakenFromTheDesign) {
   EXPECT_EQ(PlanExtended(parent, Plastic(), {.design = &design})->given.size(), 2U);
 }
 
+TEST(ExtendedCalibration, AnAdaptiveCalibrationStartsFromTheRunsOfTheDesign) {
+  const report::CampaignView parent = Parent("adaptive_emulator");
+  report::CampaignView design = Design();
+  AddRun({1e9, 0.4, 2.5, 0, 1}, "finished", design);
+  const auto plan = PlanExtended(parent, Plastic(), {.design = &design});
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  ASSERT_EQ(plan->given.size(), 1U);
+  EXPECT_EQ(plan->given[0].like, 100);
+  EXPECT_EQ(plan->method, "adaptive_emulator");
+  EXPECT_EQ(plan->samples, std::nullopt) << "max_runs says how many";
+  const auto less = PlanExtended(parent, Plastic(), {.budget = 39}).status();
+  EXPECT_THAT(std::string(less.message()), HasSubstr("takes 40 model evaluations, and 39"));
+}
+
 // They keep what parameters do together, which a proposal about the mean does not.
 TEST(ExtendedCalibration, TheFirstRunsAreAtDrawsOfThePosteriorTwiceAsFarFromItsMean) {
   const report::CampaignView parent = Parent("sqmc");

@@ -118,6 +118,39 @@ TEST(AdaptiveDesign, FillsThePriorOnBalancedPackingsWithRepeats) {
   }
 }
 
+TEST(AdaptiveDesign, RunsThatAreGivenStandForThePointsBesideThem) {
+  const AdaptiveToy toy = Bent(1);
+  const AdaptiveBatch alone = FirstRuns(toy.problem(), 24, 4, 8);
+  // The third and the eighth point, and many runs in one place, which stand for one.
+  AdaptiveBatch given{.parameters = Eigen::MatrixXd(12, 2), .packing = std::vector<int>(12, 3)};
+  given.parameters.row(0) = alone.parameters.row(2);
+  given.parameters.row(1) = alone.parameters.row(7).array() + 1e-3;
+  for (Index i = 2; i < 12; ++i)
+    given.parameters.row(i) = alone.parameters.row(11).array() + 1e-4 * static_cast<double>(i);
+  const AdaptiveBatch beside = FirstRuns(toy.problem(), 24, 4, 8, given);
+  ASSERT_EQ(beside.parameters.rows(), 21);
+  EXPECT_EQ(beside.packing.size(), 21U);
+  std::vector<Index> kept;
+  for (Index i = 0; i < 20; ++i)
+    if (i != 2 && i != 7 && i != 11) kept.push_back(i);
+  EXPECT_EQ(beside.parameters.topRows(17), alone.parameters(kept, Eigen::all));
+  for (int r = 0; r < 4; ++r) {
+    EXPECT_EQ(beside.parameters.row(17 + r), beside.parameters.row(r));
+    EXPECT_NE(beside.packing[17 + r], beside.packing[r]);
+  }
+}
+
+TEST(AdaptiveDesign, WhereAllIsGivenRepeatsAreOfThose) {
+  const AdaptiveToy toy = Bent(1);
+  AdaptiveBatch given = FirstRuns(toy.problem(), 24, 4, 8);
+  const AdaptiveBatch beside = FirstRuns(toy.problem(), 24, 4, 8, given);
+  ASSERT_EQ(beside.parameters.rows(), 4);
+  for (int r = 0; r < 4; ++r) {
+    EXPECT_EQ(beside.parameters.row(r), given.parameters.row(r));
+    EXPECT_NE(beside.packing[r], given.packing[r]);
+  }
+}
+
 TEST(ResponseEmulator, FollowsABentModelAndItsScatter) {
   const AdaptiveToy toy = Bent(2);
   const auto emulator = ResponseEmulator::Fit(toy.problem(), Filled(toy, 60), 1);

@@ -2,6 +2,9 @@
 // same whatever goes wrong. Its numbers are held by tests/verification/inference/adaptive.
 #include <gmock/gmock.h>
 
+#include <set>
+
+#include "absl/strings/str_format.h"
 #include "server/planning/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
@@ -121,6 +124,49 @@ TEST(AsynchronousAdaptiveCampaign, SameBitsWhateverGoesWrongAndWhoeverWorks) {
   }
 }
 
+// The finished runs of a campaign as rows of another.
+std::string RowsOf(SimulatedService& service, std::int64_t campaign, std::size_t most) {
+  std::string rows = "  rows:\n";
+  const auto samples = Value(service.Read().Samples(campaign));
+  for (std::size_t i = 0; i < std::min(most, samples.size()); ++i) {
+    absl::StrAppendFormat(&rows, "    - {like: %d, young_modulus: %.17g, friction_angle: %.17g}\n",
+                          samples[i].stream.value_or(samples[i].sample), samples[i].parameters[0],
+                          samples[i].parameters[1]);
+  }
+  return rows;
+}
+
+TEST(AdaptiveCampaign, StartsFromTheRunsOfAnotherWithoutMakingThemAgain) {
+  SimulatedService service("adaptive_rows");
+  service.Submit(AdaptiveCampaignOf("  max_runs: 38\n", 4));
+  service.RunToEnd(1, true);
+  const auto first = Value(service.Read().Samples(1));
+  service.Submit(AdaptiveCampaignOf("  max_runs: 60\n" + RowsOf(service, 1, first.size()), 4));
+  service.RunToEnd(2, true);
+  const auto record = Value(service.Read().Campaign(2));
+  ASSERT_EQ(record.progress.state, store::CampaignState::kFinished) << record.progress.reason;
+  int reused = 0, made = 0;
+  for (const auto& evaluation : Value(service.Read().Evaluations(2))) {
+    (evaluation.reused ? reused : made) += 1;
+  }
+  EXPECT_EQ(reused, static_cast<int>(first.size()));
+  const auto samples = Value(service.Read().Samples(2));
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(samples[i].parameters, first[i].parameters);
+    EXPECT_EQ(samples[i].stream, first[i].stream);
+  }
+  // All points that fill the prior are there: four repeats are added to them.
+  int begun = 0;
+  std::set<int> streams;
+  for (const auto& sample : samples) {
+    begun += sample.iteration == 0 ? 1 : 0;
+    streams.insert(*sample.stream);
+  }
+  EXPECT_EQ(begun, static_cast<int>(first.size()) + 4);
+  EXPECT_EQ(streams.size(), samples.size()) << "each run is one of its own";
+  EXPECT_LT(made, 60);
+}
+
 std::string FirstProblemOf(const testing::SmallCampaign& c) {
   const auto read = [&c](const std::string& path) -> absl::StatusOr<std::string> {
     const auto found = c.files.find(path);
@@ -140,6 +186,9 @@ TEST(AdaptiveCampaign, BadInputIsOneSentence) {
               HasSubstr("samples: is chosen by adaptive_emulator; max_runs bounds its runs"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  batch: many\n")), HasSubstr("batch: "));
   EXPECT_EQ(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: true\n")), "");
+  EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf(
+                  "  rows:\n    - {young_modulus: 1e8, friction_angle: 2000}\n")),
+              HasSubstr("friction_angle = 2000 lies outside the prior"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: often\n")),
               HasSubstr("asynchronous: "));
   auto inferred = AdaptiveCampaignOf("");

@@ -264,6 +264,7 @@ void CheckExperimentNames(const std::vector<ExperimentOutline>& outlines, const 
     all.as_stated.clear();
     const std::vector<ExperimentNumber> numbers = NumbersOf(all);
     std::vector<std::string> names;
+    names.reserve(numbers.size());
     for (const ExperimentNumber& number : numbers) names.push_back(number.name);
     for (const std::string& name : outline.as_stated) {
       if (outline.test == nullptr || std::find(names.begin(), names.end(), name) != names.end())

@@ -152,7 +152,8 @@ void ReadValues(MapReader& test, Experiment& next) {
 
 // What one realization is told that the test is told otherwise.
 void CheckRealizations(const MapReader& test, const Experiment& pattern, const Experiment& next) {
-  for (const auto& [name, value] : next.told) {
+  for (const auto& told : next.told) {
+    const std::string& name = told.first;
     const auto spread = [&name](const Specimen& specimen) {
       const auto* own = std::get_if<ProgramSpecimen>(&specimen);
       return own != nullptr && own->settings.contains(name);
