@@ -16,6 +16,7 @@
 #include "proto/rpc/access.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/service_manager.h"
+#include "proto/rpc/set_up_process.h"
 #include "server/page/page.h"
 #include "server/restore.h"
 #include "server/service/server.h"
@@ -134,7 +135,7 @@ std::unique_ptr<calib::page::Page> ServePage(const std::string& http,
 }  // namespace
 
 int main(int argc, char** argv) {
-  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is said below, in a sentence
+  calib::rpc::SetUpProcess();
   CLI::App app{
       "Holds calibration campaigns and leases their model evaluations to calib-worker nodes."};
   calib::service::ServerOptions options;

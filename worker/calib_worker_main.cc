@@ -21,6 +21,7 @@
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/service_manager.h"
+#include "proto/rpc/set_up_process.h"
 #include "worker/engine/engine_child.h"
 #include "worker/once.h"
 #include "worker/program/scratch.h"
@@ -81,7 +82,7 @@ bool ExitWithParent(int parent) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is said in the log, in a sentence
+  calib::rpc::SetUpProcess();
   // glibc raises this threshold with every large block that is freed, and the next run's arrays
   // then fragment the heap: 21 MiB instead of 14 for the second run of 5000 grains.
   mallopt(M_MMAP_THRESHOLD, 64 * 1024);

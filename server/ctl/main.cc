@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "proto/rpc/set_up_process.h"
 #include "server/ctl/command_line.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verb_list.h"
@@ -16,7 +17,7 @@ int Run(const calib::ctl::Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is said below, in a sentence
+  calib::rpc::SetUpProcess();
   const auto parsed = calib::ctl::ParseCommandLine(calib::ctl::AllVerbs(), argc, argv);
   const int code = parsed.command ? Run(*parsed.command) : parsed.exit_code;
   std::cout.flush();

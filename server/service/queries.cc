@@ -303,7 +303,7 @@ absl::StatusOr<std::vector<store::CampaignRecord>> Asked(store::Reader& reader,
   ASSIGN_OR_RETURN(const auto last, reader.LastCampaign());
   const auto id_of = [last](const std::string& name) -> absl::StatusOr<std::int64_t> {
     if (name.empty()) return std::int64_t{0};
-    const auto id = ParseCampaign(name);
+    auto id = ParseCampaign(name);
     if (id.ok() && *id > last) {
       return absl::NotFoundError(absl::StrCat("there is no campaign \"", name, "\""));
     }

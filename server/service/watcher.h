@@ -61,7 +61,7 @@ class Watcher : public grpc::ServerWriteReactor<Message> {
   absl::Status WhyEnd() {
     if (cancelled_) return absl::CancelledError("");
     if (!core_.health().ok()) return core_.health();
-    const absl::Status welcome = core_.guard().Recheck(entry_.caller);
+    absl::Status welcome = core_.guard().Recheck(entry_.caller);
     if (!welcome.ok()) core_.door().LogRefusal(entry_.caller.peer, welcome);
     return welcome;
   }

@@ -162,6 +162,13 @@ def test_a_campaign_is_paused_resumed_cancelled_and_deleted(tmp_path: Path) -> N
         with pytest.raises(calib.NotNow, match="paused"):
             client.pause(campaign)
         assert client.resume(campaign)["state"] in ("queued", "running")
+        assert client.set_priority(campaign, -5)["priority"] == -5
+        with pytest.raises(calib.BadInput, match="-100 to 100"):
+            client.set_priority(campaign, 101)
+        owner = client.status(campaign)["owner"]
+        assert client.set_quota(owner, 3)["slots"] == 3
+        assert client.shares().loc[owner, ["slots", "campaigns"]].tolist() == [3, 2]
+        assert client.set_quota(owner, None)["slots"] is None
         with pytest.raises(calib.NotNow):
             client.posterior(campaign)
         assert client.cancel(campaign)["state"] == "cancelled"

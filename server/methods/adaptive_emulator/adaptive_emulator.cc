@@ -45,7 +45,9 @@ class AdaptiveEmulator final : public campaign::Method {
   }
   int MostBatches(const campaign::Campaign& campaign) const override {
     if (campaign.precomputed) return 1;
-    const int later = options_.max_runs - (FirstBatch(campaign) - GivenBeside(campaign));
+    // Rows may stand for all runs that would fill the prior.
+    const int filling = GivenBeside(campaign) > 0 ? 0 : FirstBatch(campaign);
+    const int later = options_.max_runs - filling;
     const int least = std::min(options_.batch, options_.verify);
     return 1 + (std::max(0, later) + least - 1) / least;
   }

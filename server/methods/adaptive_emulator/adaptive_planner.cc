@@ -254,6 +254,7 @@ class AdaptivePlanner final : public planning::Planner {
 
   static std::vector<inference::AdaptiveMemory> OfDecisions(const std::vector<Memory>& memories) {
     std::vector<inference::AdaptiveMemory> result;
+    result.reserve(memories.size());
     for (const Memory& memory : memories) result.push_back(memory.of_decision);
     return result;
   }

@@ -83,12 +83,14 @@ class FairLine {
     int held = 0;
     std::int64_t served = 0;
     std::int64_t campaign = 0;
+    // NOLINTNEXTLINE(modernize-use-nullptr): takes the 0 behind it for a pointer
     friend auto operator<=>(const CampaignRank&, const CampaignRank&) = default;
   };
   struct OwnerRank {
     int held = 0;
     std::int64_t served = 0;
     std::string owner{};
+    // NOLINTNEXTLINE(modernize-use-nullptr): takes the 0 behind it for a pointer
     friend auto operator<=>(const OwnerRank&, const OwnerRank&) = default;
   };
   struct InLine {

@@ -38,6 +38,7 @@ class WorkerTable {
     double memory = 0;         ///< of all slots [bytes]; 0: not told
     std::string mechanics{};   ///< version and catalogue of its DEM
     bool limits_runs = false;  ///< kLimitsRuns (proto/calib/v1/protocol.h)
+    // NOLINTNEXTLINE(modernize-use-nullptr): takes the 0 behind it for a pointer
     friend auto operator<=>(const Kind&, const Kind&) = default;
   };
   static Kind KindOf(const v1::Hello& hello);

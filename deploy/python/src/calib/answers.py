@@ -48,6 +48,7 @@ class Status(TypedDict):
     samples_resting: int
     samples_stopped_early: int
     samples_diverged: int
+    samples_unknown: int
     effective_sample_size: float | None
     best_misfit: float | None  # of the best run, rms over readings in sd of the noise
     eta_seconds: float | None  # of this iteration
@@ -56,10 +57,12 @@ class Status(TypedDict):
     converged: bool
     created_unix_ms: int
     owner: str | None
+    priority: int  # among its owner's campaigns, the highest first
     parent: str | None
     purpose: str | None
     effects: list[str]
     problem: str | None
+    nobody_may_run_it: str | None  # why what waits of it is run by nobody
     server_waits: str | None
 
 
@@ -73,13 +76,14 @@ def status_of(s: campaign_pb2.CampaignStatus) -> Status:
         campaign=s.campaign, name=s.name, state=s.state, reason=s.reason, phase=s.phase, method=s.method,
         iteration=s.iteration, max_iterations=s.max_iterations, samples=s.samples, samples_done=s.samples_done,
         samples_running=s.samples_running, samples_resting=s.samples_resting,
-        samples_stopped_early=s.samples_stopped_early, samples_diverged=s.samples_diverged,
+        samples_stopped_early=s.samples_stopped_early, samples_diverged=s.samples_diverged, samples_unknown=s.samples_unknown,
         effective_sample_size=_or_none(s.effective_sample_size, s.effective_sample_size > 0),
         best_misfit=_or_none(s.best_misfit, s.best_misfit > 0),
         eta_seconds=_or_none(s.eta_seconds, s.eta_seconds >= 0),
         model_evaluations=s.model_evaluations, core_hours=s.core_hours, converged=s.converged,
-        created_unix_ms=s.created_unix_ms, owner=s.owner or None, parent=s.parent or None, purpose=s.purpose or None,
-        effects=list(s.effects), problem=s.problem or None, server_waits=s.server_waits or None)
+        created_unix_ms=s.created_unix_ms, owner=s.owner or None, priority=s.priority, parent=s.parent or None,
+        purpose=s.purpose or None, effects=list(s.effects), problem=s.problem or None,
+        nobody_may_run_it=s.nobody_may or None, server_waits=s.server_waits or None)
 
 
 PARAMETER_COLUMNS = ("mean", "sd", "cov", "q05", "q50", "q95", "unit", "at_bound", "prior_min", "prior_max",

@@ -230,6 +230,23 @@ class Client:
         """Ends a campaign for good; what was computed stays. NotNow: it is over."""
         return self._control("Cancel", campaign)
 
+    def set_priority(self, campaign: str, priority: int) -> Status:
+        """Of an owner's campaigns the highest is run first, -100 to 100; 0 is that of every new one."""
+        if not -100 <= priority <= 100:
+            raise errors.BadInput(f"priority {priority}: allowed is -100 to 100")
+        request = campaign_pb2.PriorityRequest(campaign=campaign, request_id=uuid.uuid4().hex, priority=priority)
+        return status_of(self._channel.ask("SetPriority", request, campaign_pb2.CampaignStatus))
+
+    def shares(self) -> pd.DataFrame:
+        """Who has campaigns that are not over, holds slots or has a quota: slots (the quota), held, campaigns, by owner."""
+        rows = self._calibctl("quota")
+        index = pd.Index([row["owner"] for row in rows], name="owner", dtype="object")
+        return pd.DataFrame(rows, index=index, columns=["slots", "held", "campaigns"])
+
+    def set_quota(self, owner: str, slots: int | None) -> Document:
+        """slots: that the owner's runs hold at most, 0 none at all, None no bound. Takes the role of an operator."""
+        return Document(self._calibctl("quota", owner, "--slots", "none" if slots is None else str(slots)))
+
     def delete(self, campaign: str) -> Document:
         """Removes a campaign that is over, with all that was derived from it: `deleted`, `campaigns`."""
         return self._about("delete", campaign)

@@ -28,6 +28,7 @@ export interface Status {
   converged: boolean;
   created_unix_ms: number;
   owner: string | null;
+  priority?: number;
   parent: string | null;
   purpose: string | null;
   effects: string[];
@@ -87,7 +88,14 @@ export interface PathPoint {
 
 export interface ErrorSize { mean: Maybe; sd: Maybe; q05: Maybe; q50: Maybe; q95: Maybe }
 
+/// Of runs that were chosen together. expected_gain: part of the uncertainty, 0 to 1.
+export interface PlacedBatch {
+  runs: number;
+  expected_gain: number;
+}
+
 export interface Posterior {
+  batches?: PlacedBatch[];
   campaign: string;
   iteration: number | null;
   iterations: number | null;

@@ -22,8 +22,8 @@ export function campaignsView(root: HTMLElement, answers: Answers): () => void {
     const focused = active?.closest<HTMLElement>("[data-campaign]")?.dataset["campaign"];
     replace(holder, h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Campaigns" },
       h("table", { class: "campaigns" },
-        h("thead", {}, h("tr", {}, ["campaign", "state", "samples", "effective samples", "best misfit [sd]", "runs", "core hours", "submitted"].map((name, i) =>
-          h("th", { scope: "col", class: i < 2 || i === 7 ? "text" : "" }, name)))),
+        h("thead", {}, h("tr", {}, ["campaign", "state", "owner", "samples", "effective samples", "best misfit [sd]", "runs", "core hours", "submitted"].map((name, i) =>
+          h("th", { scope: "col", class: i < 3 || i === 8 ? "text" : "" }, name)))),
         h("tbody", {}, familyRows(list, unfolded).map(row)),
       )));
     // The table is made anew; who was on a row stays there.
@@ -45,6 +45,7 @@ export function campaignsView(root: HTMLElement, answers: Answers): () => void {
         } }, open ? `fold ${kin} derived` : `${kin} derived`),
       ),
       h("td", { class: "text" }, stateBadge(s.state), s.reason === "" ? null : h("span", { class: "sub" }, s.reason)),
+      h("td", { class: "text" }, s.owner ?? "–", (s.priority ?? 0) === 0 ? null : h("span", { class: "sub" }, `priority ${s.priority}`)),
       h("td", {}, value(s.samples_done, numberText(s.samples_done)), " / ", value(s.samples, numberText(s.samples)),
         h("span", { class: "sub" }, `iteration ${s.iteration + 1} of ${s.max_iterations}`)),
       h("td", {}, value(s.effective_sample_size, numberText(s.effective_sample_size, 3))),

@@ -3,6 +3,7 @@
 import { h, replace, value } from "../dom.ts";
 import type { Answer } from "../answers.ts";
 import type { ErrorSize, Lineage, Posterior } from "../documents.ts";
+import { batchesFigure } from "../figures/batches.ts";
 import { cornerFigure, inferredParameters, pathFigure, type NamedPosterior } from "../figures/parameters.ts";
 import { chanceText, nameForPeople, numberText, quantityText, unitForPeople } from "../units.ts";
 import { absent, empty, FigureList, keeper, valueOf, warnings, watchAll, type Context, type View } from "./view.ts";
@@ -79,8 +80,12 @@ export const parametersView: View = (root, context) => {
     });
     keepChooser(valueOf<Lineage>(lineage), () => overlayChooser(lineage, others, context));
     corner.update([cornerFigure(laid, names.slice(0, kMostInCorner))]);
-    along.hidden = posterior.path.length === 0;
-    paths.update(posterior.path.length === 0 ? [] : names.map((name) => pathFigure(posterior, name)));
+    const batches = posterior.batches ?? [];
+    along.hidden = posterior.path.length === 0 && batches.length === 0;
+    paths.update([
+      ...(batches.length === 0 ? [] : [batchesFigure(batches)]),
+      ...(posterior.path.length === 0 ? [] : names.map((name) => pathFigure(posterior, name))),
+    ]);
   });
 };
 
