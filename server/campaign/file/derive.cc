@@ -116,7 +116,11 @@ void ChangeInference(const MethodList& methods, const Derivation& derivation, Ya
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
   }
-  if (!derivation.rows.empty()) YamlAt(inference, "rows") = Rows(derivation);
+  if (!derivation.rows.empty()) {
+    YamlAt(inference, "rows") = Rows(derivation);
+  } else if (!derivation.parameters.empty()) {
+    YamlErase(inference, "rows");  // the parent's lack these
+  }
   if (!derivation.parameters.empty()) RaiseRuns(methods, root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));

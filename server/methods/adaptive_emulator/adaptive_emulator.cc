@@ -140,7 +140,7 @@ class AdaptiveEmulator final : public campaign::Method {
 
   std::unique_ptr<planning::Planner> MakePlanner(
       const planning::Definition& definition) const override {
-    return MakeAdaptivePlanner(definition, options_, asynchronous_);
+    return MakeAdaptivePlanner(definition, options_);
   }
 
  private:

@@ -122,12 +122,10 @@ absl::StatusOr<Memory> FromText(const std::string& text, int number) {
 
 class AdaptivePlanner final : public planning::Planner {
  public:
-  AdaptivePlanner(const planning::Definition& definition, const inference::AdaptiveOptions& options,
-                  bool asynchronous)
+  AdaptivePlanner(const planning::Definition& definition, const inference::AdaptiveOptions& options)
       : definition_(definition),
         campaign_(definition.campaign),
         options_(options),
-        asynchronous_(asynchronous),
         coordinates_(MakeCoordinates(definition)) {
     options_.seed = campaign_.seed;
     for (const campaign::CalibratedParameter& p : campaign_.parameters) {
@@ -207,10 +205,11 @@ class AdaptivePlanner final : public planning::Planner {
     return outcome;
   }
 
+  // Asked of asynchronous campaigns alone.
   absl::StatusOr<planning::Batch> More(const planning::History& history,
                                        std::int64_t affordable) const override {
     const std::size_t batches = history.iterations.size();
-    if (!asynchronous_ || !HasEnded(history, batches - 1)) return planning::Batch{};
+    if (campaign_.precomputed || !HasEnded(history, batches - 1)) return planning::Batch{};
     ASSIGN_OR_RETURN(const auto memories, MemoriesOf(history));
     const std::vector<inference::AdaptiveMemory> earlier = OfDecisions(memories);
     // How many batches are known is the rule's, whatever else has arrived.
@@ -362,7 +361,6 @@ class AdaptivePlanner final : public planning::Planner {
   const planning::Definition& definition_;
   const campaign::Campaign& campaign_;
   inference::AdaptiveOptions options_;
-  bool asynchronous_;
   int first_round_ = 0;  // of streams, behind those that are given
   Coordinates coordinates_;
   inference::AdaptiveProblem problem_;
@@ -371,9 +369,8 @@ class AdaptivePlanner final : public planning::Planner {
 }  // namespace
 
 std::unique_ptr<planning::Planner> MakeAdaptivePlanner(const planning::Definition& definition,
-                                                       const inference::AdaptiveOptions& options,
-                                                       bool asynchronous) {
-  return std::make_unique<AdaptivePlanner>(definition, options, asynchronous);
+                                                       const inference::AdaptiveOptions& options) {
+  return std::make_unique<AdaptivePlanner>(definition, options);
 }
 
 }  // namespace calib::methods

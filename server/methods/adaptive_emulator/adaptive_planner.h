@@ -11,11 +11,9 @@
 
 namespace calib::methods {
 
-/// options: max_runs and batch; seed and names follow from the campaign. asynchronous: batches are
-/// chosen from those that have ended before the last, which runs meanwhile. Keeps a reference to
-/// the definition.
+/// options: max_runs and batch; the others follow from the campaign. Asked for more while runs are
+/// under way, it chooses from the batches before the last. Keeps a reference to the definition.
 std::unique_ptr<planning::Planner> MakeAdaptivePlanner(const planning::Definition& definition,
-                                                       const inference::AdaptiveOptions& options,
-                                                       bool asynchronous);
+                                                       const inference::AdaptiveOptions& options);
 
 }  // namespace calib::methods

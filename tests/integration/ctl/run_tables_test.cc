@@ -149,7 +149,7 @@ TEST_F(RunTables, AnAdaptiveCalibrationTakesThemAsAllThereIs) {
   WriteTables();
   Measure({.modulus = 0.8e9, .friction = 0.5, .rolling = 0, .bonds = 0});
   std::string text = Campaign();
-  text.replace(text.find("iterative_bayesian_filter"), 25, "adaptive_emulator");
+  text.replace(text.find("iterative_bayesian_filter"), 25, "adaptive_emulator, asynchronous: true");
   Write("adaptive.yaml", text);
   const Answer run = Call("run adaptive.yaml --state s --json");
   ASSERT_EQ(run.code, 0) << run.err;

@@ -128,6 +128,8 @@ TEST(Derive, MoreParametersMayTakeMoreRuns) {
   EXPECT_THAT(derived(adaptive + ", max_runs: 60, batch: auto"), HasSubstr("max_runs: 60"));
   EXPECT_THAT(derived(adaptive), HasSubstr(adaptive + "}"));
   EXPECT_THAT(derived("method: surrogate_msrs, samples: 5"), HasSubstr("samples: 9}"));
+  // Rows of the parent lack the parameters that join.
+  EXPECT_THAT(derived(adaptive + ", rows: [{a: 1, b: 2}]"), HasSubstr(adaptive + "}"));
 }
 
 // Runs of a table infer nothing, and may be of tests that read other observables.
