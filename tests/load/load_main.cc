@@ -38,6 +38,8 @@ struct Options {
 struct Used {
   double cpu_seconds = std::nan("");
   double rss_mib = std::nan("");
+  double written = std::nan("");  ///< bytes, to files
+  double writes = std::nan("");   ///< calls that wrote them
 };
 
 /// Of a process, by its files of /proc.
@@ -58,6 +60,13 @@ Used UsedBy(int pid) {
   double all = 0, resident = 0;
   pages >> all >> resident;
   used.rss_mib = resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1024.0 * 1024.0);
+  std::ifstream io(absl::StrCat("/proc/", pid, "/io"));
+  for (std::string name; io >> name;) {
+    double number = 0;
+    io >> number;
+    if (name == "wchar:") used.written = number;
+    if (name == "syscw:") used.writes = number;
+  }
   return used;
 }
 
@@ -163,6 +172,10 @@ int Run(const Options& o) {
                     {"server_us_per_state", kMicro * (after.cpu_seconds - before.cpu_seconds) /
                                                 static_cast<double>(waits.size())},
                     {"server_rss_mib", after.rss_mib},
+                    {"server_bytes_written_per_state",
+                     (after.written - before.written) / static_cast<double>(waits.size())},
+                    {"server_writes_per_state",
+                     (after.writes - before.writes) / static_cast<double>(waits.size())},
                     {"runs_finished", finished},
                     {"leases_lost", refused},
                     {"streams_ended", ended},
