@@ -100,7 +100,7 @@ std::string Held(const std::string& folder) {
   std::error_code error;
   for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
+    std::string name = entry->path().filename().string();
     if (!kLeft.contains(name)) return name;
   }
   return error && error != std::errc::no_such_file_or_directory ? error.message() : "";

@@ -81,6 +81,7 @@ std::string Listed(const Values& values) {
 
 std::vector<double> Along(const std::vector<double>& vectors, std::size_t axis) {
   std::vector<double> component;
+  component.reserve(vectors.size() / 3);
   for (std::size_t k = axis; k < vectors.size(); k += 3) component.push_back(vectors[k]);
   return component;
 }
@@ -161,6 +162,7 @@ std::vector<int> Chosen(const std::vector<int>& load_steps) {
   const auto all = static_cast<int>(load_steps.size());
   const int most = std::min(all, kMostKeptSteps);
   std::vector<int> chosen;
+  chosen.reserve(static_cast<std::size_t>(most));
   for (int k = 0; k < most; ++k) {
     chosen.push_back(
         load_steps[static_cast<std::size_t>(most == 1 ? all - 1 : k * (all - 1) / (most - 1))]);

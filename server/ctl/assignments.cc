@@ -20,6 +20,7 @@ using campaign::Quoted;
 
 std::vector<std::string> KnownNames(const campaign::Campaign& campaign) {
   std::vector<std::string> names;
+  names.reserve(campaign.parameters.size());
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     names.push_back(parameter.name);
   }

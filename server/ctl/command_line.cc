@@ -141,6 +141,7 @@ Parsed ParseCommandLine(const std::vector<Verb>& verbs, int argc, const char* co
   CLI::App app{kDescription, "calibctl"};
   MakeApp(verbs, app, common, chosen);
   std::vector<std::string> names;
+  names.reserve(verbs.size());
   for (const Verb& verb : verbs) names.push_back(verb.help.name);
   if (const auto word = UnknownVerb(names, argc, argv)) {
     std::cerr << "calibctl: " << campaign::Quoted(*word) << " is not a command; "

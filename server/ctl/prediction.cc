@@ -99,6 +99,7 @@ struct Level {
 absl::StatusOr<std::vector<Level>> ReadLevels(
     const std::vector<std::string>& texts, const std::map<std::string, std::string>& observables) {
   std::vector<std::string> known;
+  known.reserve(observables.size());
   for (const auto& [name, unit] : observables) known.push_back(name);
   std::vector<Level> levels;
   for (const std::string& text : texts) {

@@ -34,6 +34,7 @@ std::string PackingText(const campaign::Experiment& experiment, int stream,
 std::vector<std::string> MeshContents(const campaign::Experiment& experiment,
                                       const std::map<std::string, std::string>& contents) {
   std::vector<std::string> meshes;
+  meshes.reserve(experiment.meshes.size());
   for (const auto& [name, file] : experiment.meshes) meshes.push_back(contents.at(file.path));
   return meshes;
 }

@@ -181,6 +181,7 @@ absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts, const inference::Ans
     basis.beyond.push_back(LargestOf(parts.beyond[w], effects));
   }
   std::vector<std::pair<int, int>> kin;
+  kin.reserve(parts.kin.size());
   for (const auto& [a, b] : parts.kin) {
     kin.emplace_back(effects.of[static_cast<std::size_t>(a)],
                      effects.of[static_cast<std::size_t>(b)]);

@@ -129,7 +129,9 @@ std::vector<campaign::Derivation::Row> RunsOfModel(const report::CampaignView& p
     if (std::set(active.begin(), active.end()) != wanted) continue;
     auto values = ValuesInExtension(priors, design.campaign, sample);
     if (!priors.AreInside(values)) continue;
-    rows.push_back({.like = sample.has_stream() ? sample.stream() : sample.index(),
+    rows.push_back({.like = sample.has_stream()
+                                ? sample.stream()
+                                : campaign::StreamOf(design.campaign, sample.index()),
                     .values = std::move(values)});
   }
   return rows;
@@ -175,7 +177,12 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
   const auto fitted =
       std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
                     [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
-  if (!campaign.method->weighs_samples()) first = campaign.method->FirstBatch(campaign);
+  if (!campaign.method->weighs_samples()) {
+    campaign::Campaign grown = campaign;
+    grown.parameters.resize(PriorsInExtension(parent, model.effects).size());
+    grown.table.reset();
+    first = campaign.method->FirstBatch(grown) + static_cast<int>(plan.given.size());
+  }
   const std::int64_t least = static_cast<std::int64_t>(first) * fitted;
   if (budget && *budget < least) {
     return absl::ResourceExhaustedError(absl::StrCat(

@@ -178,6 +178,7 @@ absl::Status NobodyIn(const campaign::Campaign& campaign, const Race& race) {
 // By one sd, in the units of which the amplitude of what they change is normal.
 std::vector<NumericalChoice> NumericsOfProgram(const campaign::Program& program) {
   std::vector<NumericalChoice> choices;
+  choices.reserve(program.numerics.size());
   for (const auto& [name, choice] : program.numerics) {
     choices.push_back({.name = absl::StrCat(campaign::kNumerics, ".", name),
                        .null = choice.null,

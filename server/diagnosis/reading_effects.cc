@@ -123,6 +123,7 @@ bool HasLoadCell(const campaign::Experiment& experiment) {
 
 std::vector<std::optional<Stress>> StressPath(const Curve& curve, const Eigen::RowVectorXd& y) {
   std::vector<std::optional<Stress>> path;
+  path.reserve(curve.experiment->control.size());
   for (std::size_t s = 0; s < curve.experiment->control.size(); ++s) {
     path.push_back(StressAt(curve, s, y));
   }

@@ -142,6 +142,7 @@ DesignPoints SequentialCandidates(const Asked& asked) {
     const DesignPoints& draws = asked.evidence[0][static_cast<std::size_t>(i)].draws;
     std::vector<Index> rows;
     const Index n = std::min<Index>(kOfEach, draws.rows());
+    rows.reserve(static_cast<std::size_t>(n));
     for (Index j = 0; j < n; ++j) rows.push_back((2 * j + 1) * draws.rows() / (2 * n));
     parts.push_back(inference::RowsOf(draws, rows));
   }

@@ -224,6 +224,7 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
   }
   if (const auto kept = KeptAsPlanned(plan.experiment, pattern, campaign); !kept.empty()) {
     std::vector<YamlNode> names;
+    names.reserve(kept.size());
     for (const std::string& name : kept) names.push_back(campaign::YamlScalar(name));
     campaign::YamlAt(entry, "as_stated") = campaign::YamlList(std::move(names));
   }

@@ -294,6 +294,7 @@ class ExperimentDraft {
 // Of the stages of one test the one in which its control goes furthest.
 std::vector<std::size_t> TestsToUse(const Inspection& inspection) {
   std::vector<std::size_t> tests;
+  tests.reserve(inspection.tests.size());
   for (std::size_t i = 0; i < inspection.tests.size(); ++i) tests.push_back(i);
   if (!inspection.table.names_stages) return tests;
   const auto furthest =
@@ -313,6 +314,7 @@ absl::StatusOr<std::string> CampaignDraft(const std::vector<InspectedFile>& file
   const dem::TestInfo* info = dem::FindTest(question.test);
   if (info == nullptr) {
     std::vector<std::string> names;
+    names.reserve(dem::Tests().size());
     for (const dem::TestInfo& test : dem::Tests()) names.push_back(test.name);
     return absl::InvalidArgumentError(absl::StrCat("--test: ", Quoted(question.test),
                                                    " is not a lab test; ",

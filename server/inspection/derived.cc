@@ -45,6 +45,7 @@ class Deriver {
         .role = role, .name = name, .formula = formula, .unit = unit, .factor = factor};
     for (std::size_t test = 0; test < out_.table.parts.size(); ++test) {
       std::vector<double> values;
+      values.reserve(out_.table.parts[test].lines.size());
       for (std::size_t i = 0; i < out_.table.parts[test].lines.size(); ++i) {
         values.push_back(value(test, i));
       }
@@ -75,6 +76,7 @@ class Deriver {
     if (NumberOf(kDisplacement) < 0 || !(sizes_.height > 0)) return;
     if (out_.Find(kDisplacement)->unit.empty()) return;
     std::vector<std::vector<double>> way;
+    way.reserve(out_.table.parts.size());
     for (std::size_t test = 0; test < out_.table.parts.size(); ++test) {
       way.push_back(out_.Values(test, kDisplacement));
     }

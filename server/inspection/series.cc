@@ -213,6 +213,7 @@ std::vector<std::size_t> DipsOf(const Curve& curve, double noise) {
   for (const Points& points : BranchesOf(curve)) {
     const std::size_t n = points.y.size();
     std::vector<double> steps;
+    steps.reserve(n);
     for (std::size_t i = 1; i < n; ++i) steps.push_back(std::abs(points.x[i] - points.x[i - 1]));
     const double range = n > 0 ? *std::max_element(points.y.begin(), points.y.end()) -
                                      *std::min_element(points.y.begin(), points.y.end())

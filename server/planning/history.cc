@@ -91,7 +91,8 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Plac
 // Given runs stand for no density: +infinity. The samples beside them keep their own.
 void MarkGiven(const Definition& definition, History& history) {
   const Eigen::Index given = GivenRuns(definition.campaign);
-  if (given == 0 || !definition.campaign.method->weighs_samples() || history.iterations.empty()) return;
+  if (given == 0 || !definition.campaign.method->weighs_samples() || history.iterations.empty())
+    return;
   inference::Iteration& iteration = history.iterations.front();
   iteration.log_proposal =
       inference::LogDensity(iteration.proposal, definition.priors, iteration.parameters);

@@ -1,7 +1,9 @@
 #include "server/campaign/file/read_rows.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -46,6 +48,27 @@ void CheckWithinPrior(const MapReader& inference, const Campaign& campaign, Eige
     if (parameter.prior.InSupport(value)) continue;
     inference.Problem("rows", absl::StrCat("[", row, "]: ", parameter.name, " = ", value,
                                            " lies outside the prior of the parameter"));
+    return;
+  }
+  const inference::JointPrior prior = Priors(campaign);
+  if (prior.is_constrained() &&
+      !prior.MeetsConstraints(campaign.table->parameters.row(row).transpose())) {
+    inference.Problem("rows", absl::StrCat("[", row, "] does not meet the constraints"));
+  }
+}
+
+// Twice the same run would be taken for a repeat, which shows no scatter.
+void CheckDiffer(const MapReader& inference, const Table& table) {
+  std::map<std::vector<double>, Eigen::Index> first;
+  for (Eigen::Index row = 0; row < table.parameters.rows(); ++row) {
+    const Eigen::VectorXd values = table.parameters.row(row);
+    std::vector<double> run(values.begin(), values.end());
+    run.push_back(table.like[static_cast<std::size_t>(row)]);
+    const auto [same, is_new] = first.emplace(std::move(run), row);
+    if (is_new) continue;
+    inference.Problem("rows", absl::StrCat("[", row, "] is [", same->second,
+                                           "] once more: the same run; another `like` is a run "
+                                           "on another packing"));
   }
 }
 
@@ -114,11 +137,14 @@ void ReadRows(MapReader& inference, Campaign& campaign) {
   campaign.table.emplace();
   campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
                                      static_cast<Eigen::Index>(campaign.parameters.size()));
+  const std::size_t before = inference.problems().size();
   for (std::size_t i = 0; i < rows->items.size(); ++i) {
     ReadRow(rows->items[i], absl::StrCat(inference.PathOf("rows"), "[", i, "]"),
             static_cast<Eigen::Index>(i), campaign, inference.problems());
-    if (beside) CheckWithinPrior(inference, campaign, static_cast<Eigen::Index>(i));
+    if (beside && inference.problems().size() == before)
+      CheckWithinPrior(inference, campaign, static_cast<Eigen::Index>(i));
   }
+  if (beside) CheckDiffer(inference, *campaign.table);
 }
 
 void CheckDesign(const MapReader& campaign_map, const Campaign& campaign) {

@@ -25,6 +25,7 @@ std::string OptionItems(const std::vector<OptionEntry>& options) {
   std::string text;
   for (const OptionEntry& option : options) {
     std::vector<std::string> names;
+    names.reserve(option.names.size());
     for (const std::string& name : option.names) {
       names.push_back(absl::StrCat(option.at_its_place ? "\\fI" : "\\fB", Roff(name), "\\fR"));
     }

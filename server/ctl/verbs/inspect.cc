@@ -42,6 +42,7 @@ void Declare(OptionList& list, InspectOptions& options) {
 std::vector<inspection::InspectedFile> InspectAll(
     const InspectOptions& options, const std::vector<inspection::SaidMeaning>& said) {
   std::vector<inspection::InspectedFile> files;
+  files.reserve(options.files.size());
   for (const std::string& file : options.files) {
     files.push_back(inspection::InspectFile(file, options.sheet, said));
   }

@@ -3,6 +3,7 @@
 #include <sstream>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/client/documents.h"
@@ -31,14 +32,15 @@ void Declare(OptionList& list, SamplesOptions& options) {
       "over without running them again");
 }
 
-// Numbers of a campaign's own units, with every digit: the runs are known by them.
+// With every digit: the runs are known by them. Empty: none has finished.
 std::string RowsOf(const campaign::Campaign& campaign, const std::vector<v1::Sample>& samples) {
   std::vector<campaign::YamlNode> rows;
   for (const v1::Sample& sample : samples) {
     if (messages::StatusOf(sample) != campaign::EvaluationStatus::kFinished ||
         messages::PurposeOf(sample) != campaign::SamplePurpose::kEnsemble)
       continue;
-    const int stream = sample.has_stream() ? sample.stream() : sample.index();
+    const int stream =
+        sample.has_stream() ? sample.stream() : campaign::StreamOf(campaign, sample.index());
     campaign::YamlNode row =
         campaign::YamlMap({{"like", campaign::YamlScalar(std::to_string(stream))}});
     for (int k = 0; k < sample.parameters_size(); ++k) {
@@ -47,10 +49,14 @@ std::string RowsOf(const campaign::Campaign& campaign, const std::vector<v1::Sam
     }
     rows.push_back(std::move(row));
   }
+  if (rows.empty()) return "";
   return campaign::ToYaml(campaign::YamlMap({{"rows", campaign::YamlList(std::move(rows))}}));
 }
 
 absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& options) {
+  if (options.rows && common.json) {
+    return absl::InvalidArgumentError("--rows are lines of a campaign file; leave --json out");
+  }
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Client& client = session->client();
   if (common.json) {
@@ -62,7 +68,12 @@ absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& o
   ASSIGN_OR_RETURN(const auto source, client.GetSource(options.campaign));
   ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(client, source));
   if (options.rows) {
-    std::cout << RowsOf(campaign, samples);
+    const std::string rows = RowsOf(campaign, samples);
+    if (rows.empty()) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("no sample of ", options.campaign, " has finished yet"));
+    }
+    std::cout << rows;
     return kDone;
   }
   std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};

@@ -57,6 +57,7 @@ std::vector<int> AllOf(const campaign::Campaign& campaign) {
 
 std::string TableOf(const Simulation& simulation) {
   std::vector<std::pair<std::string, std::string>> tables;
+  tables.reserve(simulation.size());
   for (std::size_t e = 0; e < simulation.size(); ++e) {
     tables.emplace_back(simulation.experiment(e).name, simulation.run(e).Table());
   }

@@ -89,6 +89,7 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
     for (std::string& note : NotActedOn(*campaign.program)) notes.push_back(std::move(note));
   }
   std::vector<campaign::ExperimentSummary> summaries;
+  summaries.reserve(campaign.experiments.size());
   for (const campaign::Experiment& experiment : campaign.experiments) {
     summaries.push_back(campaign::SummaryOf(experiment));
   }

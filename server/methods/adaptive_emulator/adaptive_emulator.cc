@@ -69,7 +69,7 @@ class AdaptiveEmulator final : public campaign::Method {
              "inference",
              {
                  {kMaxRuns, campaign::Whole(1, kMostRuns), absl::StrCat(standard.max_runs),
-                  "adaptive_emulator: runs at most, of all batches together"},
+                  "adaptive_emulator: runs at most, of all batches together, `rows` aside"},
                  {kBatch, campaign::AnyOf({campaign::Whole(1, 1000), campaign::OneWord({"auto"})}),
                   absl::StrCat("auto: ", standard.batch),
                   "adaptive_emulator: runs that are chosen together"},

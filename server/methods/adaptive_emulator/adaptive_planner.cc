@@ -198,6 +198,11 @@ class AdaptivePlanner final : public planning::Planner {
     }
     const bool tells = !campaign_.precomputed && !decision.reason.empty();
     if (tells) outcome.answer.warnings.push_back(decision.reason);
+    if (goes_on) {
+      outcome.answer.warnings.push_back(
+          absl::StrCat("Not converged: the budget allows no further batch of ",
+                       decision.next.parameters.rows(), " runs."));
+    }
     planning::AskEmulator(definition_, history.iterations, outcome.answer);
     // Of runs that were made before there are no more.
     outcome.converged = (decision.stage == AdaptiveStage::kConverged || campaign_.precomputed) &&
@@ -291,7 +296,8 @@ class AdaptivePlanner final : public planning::Planner {
       for (Index i = 0; i < batch.parameters.rows(); ++i, ++row) {
         const store::SampleRecord& sample = history.samples[static_cast<std::size_t>(row)];
         runs.parameters.row(row) = batch.parameters.row(i);
-        if (problem_.prior.InSupport(batch.parameters.row(i).transpose())) inside.push_back(row);
+        if (!campaign_.precomputed || problem_.prior.InSupport(batch.parameters.row(i).transpose()))
+          inside.push_back(row);
         runs.packing.push_back(sample.stream.value_or(0) % problem_.packings);
         runs.batch.push_back(static_cast<int>(k));
         if (k >= known) {

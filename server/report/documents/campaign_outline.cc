@@ -22,6 +22,7 @@ namespace {
 template <typename Entries>
 absl::Status IsNamed(const Entries& entries, const std::string& name, const std::string& what) {
   std::vector<std::string> names;
+  names.reserve(entries.size());
   for (const auto& entry : entries) names.push_back(entry.name);
   if (std::find(names.begin(), names.end(), name) != names.end()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("'", name, "' is no ", what, " of this build; ",

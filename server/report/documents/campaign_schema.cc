@@ -164,6 +164,7 @@ std::string ValuesOf(const std::vector<Section>& sections, const Form& form) {
       constexpr std::size_t kMostWords = 8;  // longer lists are those of the catalogue
       if (form.words.size() > kMostWords) return "name";
       std::vector<std::string> words;
+      words.reserve(form.words.size());
       for (const std::string& word : form.words) words.push_back(Code(word));
       return absl::StrJoin(words, ", ");
     }
@@ -180,6 +181,7 @@ std::string ValuesOf(const std::vector<Section>& sections, const Form& form) {
     }
     case Form::Kind::kAnyOf: {
       std::vector<std::string> values;
+      values.reserve(form.of.size());
       for (const Form& one : form.of) values.push_back(ValuesOf(sections, one));
       return absl::StrJoin(values, "; or ");
     }

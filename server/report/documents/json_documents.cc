@@ -414,6 +414,7 @@ std::string StateTableJson(const std::string& csv) {
       ignored;  // the table is our own; without rows it has no states
   const campaign::DataTable table(csv, {}, ignored);
   std::vector<std::vector<std::string>> columns;
+  columns.reserve(table.columns().size());
   for (const std::string& name : table.columns()) columns.push_back(table.Texts(name));
   Json states = Json::array();
   for (std::size_t row = 0; row < table.rows(); ++row) {

@@ -181,9 +181,11 @@ Methods MethodsOf(const CampaignView& view) {
     say(PopulationSentence(campaign, population));
   }
   std::vector<std::string> tied;
+  tied.reserve(campaign.tied.size());
   for (const auto& t : campaign.tied) tied.push_back(NameForPeople(t.name) + " = " + t.text);
   if (!tied.empty()) say("Tied to others: " + Listed(tied) + ".");
   std::vector<std::string> fixed;
+  fixed.reserve(campaign.model.parameters.size());
   for (const auto& [name, value] : campaign.model.parameters) {
     fixed.push_back(NameForPeople(name) + " = " + Number(value));
   }

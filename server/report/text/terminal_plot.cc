@@ -60,7 +60,7 @@ class Canvas {
     const int down = dots_high() - 1 - y;
     const int per_x = style_.utf8 ? kDotsWide : 1;
     const int per_y = style_.utf8 ? kDotsHigh : 1;
-    Cell& cell = cells_[static_cast<std::size_t>(down / per_y * wide_ + x / per_x)];
+    Cell& cell = cells_[Index(x / per_x, down / per_y)];
     cell.dots |= kDots[static_cast<std::size_t>(x % per_x)][static_cast<std::size_t>(down % per_y)];
     cell.curve = curve;
   }
@@ -75,7 +75,7 @@ class Canvas {
   [[nodiscard]] std::string Row(int row) const {
     std::string text;
     for (int i = 0; i < wide_; ++i) {
-      const Cell& cell = cells_[static_cast<std::size_t>(row * wide_ + i)];
+      const Cell& cell = cells_[Index(i, row)];
       text += cell.curve < 0 ? " " : Sign(cell);
     }
     while (!text.empty() && text.back() == ' ') text.pop_back();
@@ -86,10 +86,14 @@ class Canvas {
   [[nodiscard]] std::string Sample(int curve) const { return Sign({0x24, curve}); }
 
  private:
+  [[nodiscard]] std::size_t Index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(wide_) +
+           static_cast<std::size_t>(column);
+  }
   [[nodiscard]] std::string Sign(const Cell& cell) const {
     const auto at = static_cast<std::size_t>(cell.curve);
     const bool braille = style_.utf8 && (style_.colour || cell.curve == 0);
-    const std::string sign =
+    std::string sign =
         braille ? Utf8Of(0x2800 + cell.dots) : std::string(1, kSigns[at % kSigns.size()]);
     if (!style_.colour) return sign;
     return absl::StrCat(kColours[at % kColours.size()], sign, "\033[0m");

@@ -69,6 +69,7 @@ std::vector<std::vector<double>> Resampled(const Cloud& cloud) {
 /// Where a curve is drawn, evenly in the standardised coordinate.
 std::vector<double> Grid(double from, double to) {
   std::vector<double> grid;
+  grid.reserve(kPoints);
   for (int k = 0; k < kPoints; ++k) grid.push_back(from + (to - from) * k / (kPoints - 1));
   return grid;
 }
@@ -85,6 +86,7 @@ DensityCurve PriorCurve(const inference::Prior& prior, double from, double to) {
 
 DensityCurve PosteriorCurve(const inference::Prior& prior, const Cloud& cloud, std::size_t j) {
   std::vector<double> at;
+  at.reserve(cloud.points.size());
   for (const auto& point : cloud.points) {
     at.push_back(j < point.size() ? prior.ToStandard(point[j]) : std::nan(""));
   }

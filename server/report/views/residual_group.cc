@@ -37,6 +37,7 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
       GroupScatterOf(*record, Eigen::Map<const Eigen::VectorXd>(
                                   travelled.data(), static_cast<Eigen::Index>(travelled.size())));
   std::vector<Eigen::Index> kept;
+  kept.reserve(group.readings.size());
   for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
   const double times =
       scatter.share +
@@ -98,6 +99,7 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
   const Eigen::Map<const Eigen::VectorXd> path(travelled.data(), size);
   if (group.observable->covariance.size() > 0) {
     std::vector<Eigen::Index> kept;
+    kept.reserve(group.readings.size());
     for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
     group.covariance = Eigen::MatrixXd(group.observable->covariance(kept, kept));
   } else {

@@ -105,6 +105,7 @@ std::vector<std::string> WhereItFails(const Comparison& comparison) {
   });
   if (bad.size() > static_cast<std::size_t>(kMostStages)) bad.resize(kMostStages);
   std::vector<std::string> sentences;
+  sentences.reserve(comparison.prior_conflicts.size());
   for (const PriorConflict& conflict : comparison.prior_conflicts) {
     sentences.push_back(InWords(conflict));
   }

@@ -140,8 +140,8 @@ TEST(ExtendedCalibration, AnAdaptiveCalibrationStartsFromTheRunsOfTheDesign) {
   EXPECT_EQ(plan->given[0].like, 100);
   EXPECT_EQ(plan->method, "adaptive_emulator");
   EXPECT_EQ(plan->samples, std::nullopt) << "max_runs says how many";
-  const auto less = PlanExtended(parent, Plastic(), {.budget = 39}).status();
-  EXPECT_THAT(std::string(less.message()), HasSubstr("takes 40 model evaluations, and 39"));
+  const auto less = PlanExtended(parent, Plastic(), {.design = &design, .budget = 61}).status();
+  EXPECT_THAT(std::string(less.message()), HasSubstr("takes 62 model evaluations, and 61"));
 }
 
 // They keep what parameters do together, which a proposal about the mean does not.
