@@ -112,6 +112,7 @@ std::optional<LeaseEntry> Scheduler::Release(std::int64_t attempt) {
     shares_.Return(HoldingOf(*lease));
     workers_.SetBusy(lease->worker, leases_.Busy(lease->worker));
     NoLongerUnderWay(lease->shared);
+    WorkersChanged();
   }
   return lease;
 }

@@ -278,7 +278,6 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   const int failures = run.Find(lease.key)->failures;
   SetStatus(run, lease.key, status, failures);
   Changed(lease.key.campaign);
-  WorkersChanged();
   // Before an iteration is complete, and where held-out tests are run, each run counts by itself.
   if (run.progress().iteration == 0 || run.progress().phase != campaign::Phase::kCalibrating) {
     Concluded(lease.key.campaign);
@@ -343,7 +342,6 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
   finished.set_attempt(lease.attempt);
   CampaignRun* run = FindRun(lease.key.campaign);
   Changed(lease.key.campaign);
-  WorkersChanged();
   if (run == nullptr) {
     ports_.Write([end = ToRecord(finished, outcome)](Transaction& t) { t.EndAttempt(end); },
                  [](const absl::Status&) {});

@@ -6,9 +6,9 @@
 
 namespace calib::simulation {
 
-void LeaseWatch::Heard(const std::string& worker, int stream, bool is_hello, Time now) {
+void LeaseWatch::Heard(const std::string& worker, int stream, bool is_welcomed, Time now) {
   Voice& voice = voices_[worker];
-  if (is_hello) voice.stream = stream;
+  if (is_welcomed) voice.stream = stream;
   if (stream == voice.stream) voice.heard = now;
 }
 

@@ -18,8 +18,9 @@ class LeaseWatch {
  public:
   explicit LeaseWatch(milliseconds lease) : lease_(lease) {}
 
-  /// The server takes in a message of this worker, over this stream.
-  void Heard(const std::string& worker, int stream, bool is_hello, Time now);
+  /// The server takes in a message of this worker over this stream, or welcomes it there: a hello
+  /// by itself may be refused, as that of a process whose name another bears.
+  void Heard(const std::string& worker, int stream, bool is_welcomed, Time now);
   /// After each task of the strand; of_tick: it was by the clock alone. What is wrong, a sentence;
   /// empty: nothing is.
   std::string Look(scheduler::Scheduler& scheduler, Time now, bool of_tick);

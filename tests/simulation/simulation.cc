@@ -114,14 +114,16 @@ class Simulation final : public Watcher, public Surroundings {
   void Takes(const Stream& stream, const v1::WorkerMessage& message) override {
     Tell("takes", stream, Brief(message));
     ledger_.Takes(message);
-    leases_.Heard(workers_[Worker(stream)].options().name, stream.number, message.has_hello(),
-                  clocks_.now);
+    if (message.has_hello()) return;
+    leases_.Heard(workers_[Worker(stream)].options().name, stream.number, false, clocks_.now);
   }
   void Sends(const Stream& stream, const v1::ServerMessage& message) override {
     Tell("sends", stream,
          message.has_lease() ? absl::StrCat("lease ", message.lease().attempt(), " of ",
                                             message.lease().run().substr(0, 8))
                              : message.ShortDebugString());
+    if (message.has_welcome())
+      leases_.Heard(workers_[Worker(stream)].options().name, stream.number, true, clocks_.now);
     Violate(ledger_.Sends(
         stream.name.empty() ? workers_[Worker(stream)].options().name : stream.name, message));
   }
