@@ -190,8 +190,8 @@ TEST(AdaptiveCampaign, BadInputIsOneSentence) {
                   "  rows:\n    - {young_modulus: 1e8, friction_angle: 2000}\n")),
               HasSubstr("friction_angle = 2000 lies outside the prior"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf(
-                  "  rows:\n    - {like: 4, young_modulus: 1e8, friction_angle: 20}\n"
-                  "    - {like: 4, young_modulus: 1e8, friction_angle: 20}\n")),
+                  "  rows:\n    - {like: 4, young_modulus: 1e8, friction_angle: 0.4}\n"
+                  "    - {like: 4, young_modulus: 1e8, friction_angle: 0.4}\n")),
               HasSubstr("rows: [1] is [0] once more: the same run"));
   EXPECT_THAT(FirstProblemOf(AdaptiveCampaignOf("  asynchronous: often\n")),
               HasSubstr("asynchronous: "));
