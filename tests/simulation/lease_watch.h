@@ -33,11 +33,17 @@ class LeaseWatch {
   struct Voice {
     int stream = 0;  // the newest
     Time heard{};
+    /// awake_ then, or when it was leased more, or when all were pardoned.
+    Time::duration heard_awake{};
   };
+  /// Of a tick: whose lease outlives its silence.
+  std::string Outlived(Time now);
   milliseconds lease_;
   std::uint64_t seen_ = 0;  // Scheduler::workers_changed
   std::map<std::string, Leased> leased_;
   std::map<std::string, Voice> voices_;
+  Time ticked_{};
+  Time::duration awake_{};  // that the server has been, by its ticks
 };
 
 }  // namespace calib::simulation
