@@ -189,22 +189,22 @@ bool MayOverlap(std::span<const AdaptiveMemory> earlier) {
 }
 
 absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
-                                                const AdaptiveRuns& asked_for,
+                                                const AdaptiveRuns& all,
                                                 std::span<const AdaptiveMemory> earlier,
                                                 const AdaptiveOptions& options) {
   RETURN_IF_ERROR(options.Validate());
   RETURN_IF_ERROR(problem.Validate());
-  RETURN_IF_ERROR(asked_for.Validate(problem));
-  const AdaptiveRuns runs = asked_for.Ended();
+  RETURN_IF_ERROR(all.Validate(problem));
+  const AdaptiveRuns runs = all.Ended();
   const auto d = static_cast<Index>(problem.prior.size());
   const auto batches = static_cast<int>(earlier.size());
   const auto batches_of = [](const AdaptiveRuns& some) {
     return some.rows() == 0 ? 0 : some.batch.back() + 1;
   };
   const int ended = batches_of(runs);
-  if (batches_of(asked_for) != batches) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "runs of ", batches_of(asked_for), " batches, and ", batches, " earlier decisions"));
+  if (batches_of(all) != batches) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("runs of ", batches_of(all), " batches, and ", batches, " earlier decisions"));
   }
   if (batches > 0 &&
       (ended == 0 || (ended < batches && earlier.back().stage == AdaptiveStage::kVerifying))) {
@@ -236,7 +236,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   const auto complete =
       static_cast<Index>(std::count(runs.end.begin(), runs.end.end(), RunEnd::kComplete));
   const auto left =
-      static_cast<int>(options.max_runs + options.given.parameters.rows() - asked_for.rows());
+      static_cast<int>(options.max_runs + options.given.parameters.rows() - all.rows());
   if (complete < ResponseEmulator::LeastRuns(d)) {
     const std::string found =
         complete == 0 ? absl::StrCat("None of ", runs.rows(), " runs is complete")
@@ -316,11 +316,11 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
                       ((settled && settled_before && known && !just_failed) || last);
   if (verify) {
     result.stage = AdaptiveStage::kVerifying;
-    result.next = VerifyingRuns(problem, asked_for, posterior, options.verify);
+    result.next = VerifyingRuns(problem, all, posterior, options.verify);
   } else {
     result.stage = AdaptiveStage::kSearching;
     const int count = std::min(options.batch, left);
-    result.next = NextBatch(problem, asked_for, *emulator, region, posterior,
+    result.next = NextBatch(problem, all, *emulator, region, posterior,
                             {.runs = count,
                              .explore = std::min(options.explore, count),
                              .seed = options.seed,

@@ -86,20 +86,19 @@ int LeastMaxRuns(Eigen::Index parameters, const AdaptiveOptions& options);
 /// for and another one taken.
 bool MayOverlap(std::span<const AdaptiveMemory> earlier);
 
-/// The decision after complete batches, those of which all runs are pending aside: their places
-/// count, and what later ones remember is compared where it knew more. Verifying runs are to have
-/// ended. Settled is a posterior whose means and widths have moved by
-/// less than the options say at each of the last two batches, and whose means are known well enough
-/// (a mean may rest where the emulator is wrong); then `verify` draws of it are run and
-/// predicted (Fisher's chi-squared above one in a thousand, and at least seven tenths of the
-/// coordinates in their 90 % intervals). The last runs of max_runs are kept for that. Refused:
-/// max_runs below LeastMaxRuns; no first run complete, or too few; scatter that leaves no signal;
-/// runs that are missed by more than repeats of them differ, or than the emulator claims.
-/// Deterministic in the arguments. Pure.
-/// in: earlier, of each batch so far the memory of the decision that asked for it, in order
+/// The decision after batches that have ended; the last may be pending, all of it (MayOverlap):
+/// then its places count, and nothing else. Settled is a posterior whose means and widths have
+/// moved by less than the options say at each of the last two decisions, each of which knew more
+/// batches than the one before, and whose means are known well enough (a mean may rest where the
+/// emulator is wrong); then `verify` draws of it are run and predicted (Fisher's chi-squared above
+/// one in a thousand, and at least seven tenths of the coordinates in their 90 % intervals). The
+/// last runs of max_runs are kept for that. Refused: max_runs below LeastMaxRuns; no first run
+/// complete, or too few; scatter that leaves no signal; runs that are missed by more than repeats
+/// of them differ, or than the emulator claims. Deterministic in the arguments. Pure. in: all, runs
+/// so far; earlier, of each batch so far the memory of the decision that asked for it, in order
 /// Errors: INVALID_ARGUMENT for what does not fit.
 absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
-                                                const AdaptiveRuns& runs,
+                                                const AdaptiveRuns& all,
                                                 std::span<const AdaptiveMemory> earlier,
                                                 const AdaptiveOptions& options);
 

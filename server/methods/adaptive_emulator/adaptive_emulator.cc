@@ -74,7 +74,7 @@ class AdaptiveEmulator final : public campaign::Method {
                   absl::StrCat("auto: ", standard.batch),
                   "adaptive_emulator: runs that are chosen together"},
                  {"rows", campaign::ListOf(campaign::MapOf("row")), "none",
-                  "adaptive_emulator: runs of the first batch that max_runs does not count"},
+                  "runs that come first, beside those that max_runs counts"},
                  {kAsynchronous, campaign::TrueOrFalse(), "false",
                   "adaptive_emulator: true, the next batch is chosen while one runs, from those "
                   "before it, so that no core waits for the last run of a batch"},
@@ -91,6 +91,11 @@ class AdaptiveEmulator final : public campaign::Method {
                                               batch->scalar == "auto");
     if (!is_auto) {
       options.batch = static_cast<int>(inference.Integer(kBatch).value_or(options.batch));
+    }
+    for (const char* key : {kMaxRuns, kBatch, kAsynchronous}) {
+      if (campaign.precomputed && inference.Has(key)) {
+        inference.Problem(key, "has no meaning with runs that exist already; remove it");
+      }
     }
     read->asynchronous_ = inference.TrueOrFalse(kAsynchronous).value_or(false);
     for (const char* key : {"samples", "max_iterations"}) {

@@ -26,7 +26,8 @@ class IterativeBayesianFilter final : public Filter {
         {kFreeze, campaign::MapOf(kFreeze), "nothing", "iterative filter: what iterations hold"});
     sections.front().keys.push_back(
         {"rows", campaign::ListOf(campaign::MapOf("row")), "none",
-         "table, design, iterative filter, adaptive_emulator: runs to be made"});
+         "table, design: runs to be made; iterative filter, adaptive_emulator: runs that come "
+         "first, beside its own"});
     sections.push_back({kFreeze,
                         "inference.freeze",
                         {{"ITERATION", campaign::OneOrMore(campaign::Text()), "",

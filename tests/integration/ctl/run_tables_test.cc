@@ -149,8 +149,16 @@ TEST_F(RunTables, AnAdaptiveCalibrationTakesThemAsAllThereIs) {
   WriteTables();
   Measure({.modulus = 0.8e9, .friction = 0.5, .rolling = 0, .bonds = 0});
   std::string text = Campaign();
-  text.replace(text.find("iterative_bayesian_filter"), 25, "adaptive_emulator, asynchronous: true");
+  text.replace(text.find("iterative_bayesian_filter"), 25, "adaptive_emulator");
   Write("adaptive.yaml", text);
+  std::string chooses = text;
+  chooses.replace(chooses.find("adaptive_emulator}"), 18, "adaptive_emulator, max_runs: 90}");
+  Write("chooses.yaml", chooses);
+  const Answer refused = Call("validate chooses.yaml");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("max_runs: has no meaning with runs that exist already"),
+            std::string::npos)
+      << refused.err;
   const Answer run = Call("run adaptive.yaml --state s --json");
   ASSERT_EQ(run.code, 0) << run.err;
   const Json posterior = run.json();

@@ -247,6 +247,13 @@ TEST(AdaptiveDecision, NextRunsLieWhereTheDensityMayBeLargeAndOneExplores) {
   EXPECT_EQ(*std::min_element(count.begin(), count.end()), 2);
 }
 
+// After these as the only batch.
+AdaptiveDecision DecisionAfter(const AdaptiveToy& toy, const AdaptiveRuns& runs) {
+  auto decision = DecideAdaptive(toy.problem(), runs, kOneBatch, {.seed = 2});
+  EXPECT_TRUE(decision.ok()) << decision.status();
+  return decision.ok() ? *std::move(decision) : AdaptiveDecision{};
+}
+
 // The last batch of these is under way.
 AdaptiveRuns WithPending(AdaptiveRuns runs, const AdaptiveBatch& batch, int number) {
   const Index n = runs.rows(), more = batch.parameters.rows();
@@ -265,34 +272,32 @@ AdaptiveRuns WithPending(AdaptiveRuns runs, const AdaptiveBatch& batch, int numb
 TEST(AdaptiveDecision, PendingRunsCountAsMade) {
   const AdaptiveToy toy = Bent(6);
   const AdaptiveRuns runs = Filled(toy, 30);
-  const auto first = DecideAdaptive(toy.problem(), runs, kOneBatch, {.seed = 2});
-  ASSERT_TRUE(first.ok());
-  std::vector<AdaptiveMemory> memory = {{}, first->memory};
+  const AdaptiveDecision first = DecisionAfter(toy, runs);
+  std::vector<AdaptiveMemory> memory = {{}, first.memory};
   EXPECT_EQ(memory[1].batches, 1);
   const auto second =
-      DecideAdaptive(toy.problem(), WithPending(runs, first->next, 1), memory, {.seed = 2});
+      DecideAdaptive(toy.problem(), WithPending(runs, first.next, 1), memory, {.seed = 2});
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ(second->memory.batches, 1) << "it knew no more than the one before";
   EXPECT_EQ(second->quality->complete, 30);
   ASSERT_EQ(second->next.parameters.rows(), 6);
   // The gain is that beyond what the pending runs will bring.
-  EXPECT_LT(second->next.expected_gain, first->next.expected_gain);
+  EXPECT_LT(second->next.expected_gain, first.next.expected_gain);
   EXPECT_GT(second->next.expected_gain, 0);
   for (Index i = 0; i < 6; ++i) {
     for (Index j = 0; j < 6; ++j)
-      EXPECT_NE(second->next.parameters.row(i), first->next.parameters.row(j));
+      EXPECT_NE(second->next.parameters.row(i), first.next.parameters.row(j));
   }
 }
 
 TEST(AdaptiveDecision, HasNotSettledByKnowingNothingNew) {
   const AdaptiveToy toy = Bent(6);
   const AdaptiveRuns runs = Filled(toy, 60);
-  const auto first = DecideAdaptive(toy.problem(), runs, kOneBatch, {.seed = 2});
-  ASSERT_TRUE(first.ok());
+  const AdaptiveDecision first = DecisionAfter(toy, runs);
   // Two batches are under way, chosen with one posterior.
-  std::vector<AdaptiveMemory> memory = {{}, first->memory, first->memory, first->memory};
+  std::vector<AdaptiveMemory> memory = {{}, first.memory, first.memory, first.memory};
   AdaptiveRuns pending = runs;
-  for (int number = 1; number <= 3; ++number) pending = WithPending(pending, first->next, number);
+  for (int number = 1; number <= 3; ++number) pending = WithPending(pending, first.next, number);
   const AdaptiveOptions wide{.mean_moves = 1e9, .width_moves = 1e9, .mean_error = 1e9, .seed = 2};
   const auto same = DecideAdaptive(toy.problem(), pending, memory, wide);
   ASSERT_TRUE(same.ok()) << same.status();
@@ -306,15 +311,14 @@ TEST(AdaptiveDecision, HasNotSettledByKnowingNothingNew) {
 TEST(AdaptiveDecision, WaitsForTheRunsThatJudge) {
   const AdaptiveToy toy = Bent(6);
   const AdaptiveRuns runs = Filled(toy, 30);
-  const auto first = DecideAdaptive(toy.problem(), runs, kOneBatch, {.seed = 2});
-  ASSERT_TRUE(first.ok());
-  std::vector<AdaptiveMemory> memory = {{}, first->memory};
+  const AdaptiveDecision first = DecisionAfter(toy, runs);
+  std::vector<AdaptiveMemory> memory = {{}, first.memory};
   EXPECT_TRUE(MayOverlap(memory));
   EXPECT_FALSE(MayOverlap(kOneBatch));
   memory[1].stage = AdaptiveStage::kVerifying;
   EXPECT_FALSE(MayOverlap(memory));
   const auto too_early =
-      DecideAdaptive(toy.problem(), WithPending(runs, first->next, 1), memory, {});
+      DecideAdaptive(toy.problem(), WithPending(runs, first.next, 1), memory, {});
   EXPECT_THAT(std::string(too_early.status().message()), HasSubstr("before more runs have ended"));
 }
 
