@@ -38,8 +38,8 @@ struct Options {
 struct Used {
   double cpu_seconds = std::nan("");
   double rss_mib = std::nan("");
-  double written = std::nan("");  ///< bytes, to files
-  double writes = std::nan("");   ///< calls that wrote them
+  double written = std::nan("");  ///< bytes, by write and its kin: files, and wake-ups
+  double writes = std::nan("");   ///< those calls
 };
 
 /// Of a process, by its files of /proc.

@@ -218,26 +218,40 @@ class AdaptivePlanner final : public planning::Planner {
     ASSIGN_OR_RETURN(const auto memories, MemoriesOf(history));
     const std::vector<inference::AdaptiveMemory> earlier = OfDecisions(memories);
     // How many batches are known is the rule's, whatever else has arrived.
-    const auto decide = [&](std::size_t known) -> absl::StatusOr<planning::Batch> {
+    const auto decide = [&](std::size_t known,
+                            std::int64_t most) -> absl::StatusOr<planning::Batch> {
       const inference::AdaptiveRuns runs = RunsOf(history, known);
       ASSIGN_OR_RETURN(const auto decision,
                        inference::DecideAdaptive(problem_, runs, earlier, options_));
       if (decision.stage == AdaptiveStage::kRefused) {
         return absl::FailedPreconditionError(decision.reason);
       }
-      if (decision.next.parameters.rows() > affordable) return planning::Batch{};
+      if (decision.next.parameters.rows() > most) return planning::Batch{};
       return BatchOf(decision, static_cast<int>(batches), static_cast<int>(runs.rows()));
     };
     std::size_t& none_at = definition_.memory->Of<NoneBeforeTheLast>().batches;
     if (inference::MayOverlap(earlier) && none_at != batches) {
-      auto batch = decide(batches - 1);
+      auto batch = decide(batches - 1, AffordableWhateverArrives(history, affordable));
       if (batch.ok() && batch->parameters.rows() > 0) return batch;
       none_at = batches;
     }
-    return HasEnded(history, batches) ? decide(batches) : planning::Batch{};
+    return HasEnded(history, batches) ? decide(batches, affordable) : planning::Batch{};
   }
 
  private:
+  /// Runs that the budget allows beside all asked for so far at their full price: what those under
+  /// way have cost by now goes by who is quick. Core hours are never the same twice.
+  std::int64_t AffordableWhateverArrives(const planning::History& history,
+                                         std::int64_t affordable) const {
+    const campaign::Budget& budget = campaign_.budget;
+    std::int64_t most = budget.core_hours ? affordable : std::numeric_limits<std::int64_t>::max();
+    if (budget.model_evaluations) {
+      const auto tests = std::ssize(definition_.ExperimentsOf(campaign::Role::kCalibrate));
+      most = std::min(most, *budget.model_evaluations / tests - std::ssize(history.samples));
+    }
+    return most;
+  }
+
   /// Whether all runs of the first `batches` have.
   static bool HasEnded(const planning::History& history, std::size_t batches) {
     for (std::size_t k = 0; k < batches; ++k) {

@@ -86,6 +86,31 @@ TEST(AdaptiveCampaign, SameBitsWhateverGoesWrong) {
   }
 }
 
+TEST(AsynchronousAdaptiveCampaign, ABudgetEndsItAtTheSameBatchWhoeverWorks) {
+  // Of 32 runs the first batch and two others are made; a third would exceed them.
+  const auto campaign =
+      testing::MakeSmallCampaign({.samples = 0,
+                                  .load_steps = 12,
+                                  .relative_noise = 0.02,
+                                  .with_second = true,
+                                  .method = "adaptive_emulator",
+                                  .inference = "  max_runs: 56\n  asynchronous: true\n",
+                                  .extra = "budget: {model_evaluations: 74}\n"});
+  std::string first;
+  for (const int workers : {1, 3, 40}) {
+    SimulatedService service("asynchronous_budget");
+    service.Submit(campaign);
+    service.RunTimed(workers, [](int evaluation) { return 1.0 + (evaluation * 7) % 5; });
+    const auto samples = Value(service.Read().Samples(1));
+    EXPECT_EQ(samples.size(), 32U);
+    const v1::Posterior posterior = PosteriorAtTheEnd(service);
+    EXPECT_THAT(posterior.warnings(),
+                ::testing::Contains(HasSubstr("the budget allows no further batch of 6 runs")));
+    if (first.empty()) first = service.Fingerprint();
+    EXPECT_EQ(service.Fingerprint(), first) << workers << " workers";
+  }
+}
+
 constexpr const char* kAsynchronous = "  max_runs: 56\n  asynchronous: true\n";
 
 TEST(AsynchronousAdaptiveCampaign, HasTheNextBatchUnderWayBeforeOneHasEnded) {
