@@ -153,7 +153,8 @@ struct Page::Impl {
   HttpAnswer File(const HttpRequest& request, const std::string& name) const;
   void Ask(const HttpRequest& request, const Target& target, const HttpServer::Finish& finish);
   /// A text that the server is asked for and everybody may see.
-  void AskOpenly(const HttpRequest& request, Document document, const HttpServer::Finish& finish);
+  void AskOpenly(const HttpRequest& request, Document document,
+                 const HttpServer::Finish& finish) const;
   /// Answers what needs no token; empty: it needs one.
   std::optional<HttpAnswer> Open(const Target& target) const;
 };
@@ -171,7 +172,7 @@ std::optional<HttpAnswer> Page::Impl::Open(const Target& target) const {
 }
 
 void Page::Impl::AskOpenly(const HttpRequest& request, Document document,
-                           const HttpServer::Finish& finish) {
+                           const HttpServer::Finish& finish) const {
   if (!changes.is_up()) {
     finish(Text(503, kNoAnswer));
     return;
