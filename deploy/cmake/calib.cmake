@@ -28,11 +28,11 @@ add_library(calib_flags INTERFACE)
 target_compile_options(calib_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
   # g++ 12 sees overlaps and overruns in the standard library that are not there (GCC bugs 105651, 105329), and forgets in a
-  # precompiled header that the library's insides are not ours. clang-tidy does not know these options.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-unknown-warning-option>
-  # Preset fuzz alone compiles with clang++: what it warns of besides is clang-tidy's to say.
+  # precompiled header that the library's insides are not ours.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds>
+  # Presets fuzz and tidy alone compile with clang++: what it warns of besides is clang-tidy's to say.
   $<$<CXX_COMPILER_ID:Clang>:-Wno-error;-Wno-unknown-pragmas>)
-if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CXX_CLANG_TIDY)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   # g++ looks for memory to free again and again; from half a GB on is soon enough (9 % of the time of a large unit, 0.2 GB more).
   target_compile_options(calib_flags INTERFACE --param=ggc-min-heapsize=524288)
 endif()
@@ -55,7 +55,7 @@ function(calib_precompiled name)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_flags)
   target_compile_options(${name} PRIVATE ${ARG_FLAGS})
   target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
-  set_target_properties(${name} PROPERTIES CALIB_LINKS "${ARG_LINKS}" CXX_CLANG_TIDY "")
+  set_target_properties(${name} PROPERTIES CALIB_LINKS "${ARG_LINKS}")
 endfunction()
 
 function(calib_use_precompiled target name)
