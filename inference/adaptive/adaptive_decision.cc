@@ -33,6 +33,10 @@ constexpr double kLeastRepeatsChance = 1e-3;
 // Squared errors over those of repeats from which it is the model that varies and not chance; of
 // four repeats and several coordinates chance makes less than four.
 constexpr double kSharpDifference = 4;
+// Chance below which the model misses the readings: of a thousand calibrations of a right model,
+// of twenty-five decisions each, one in forty meets it by chance; and how often in a row.
+constexpr double kLeastMissChance = 1e-6;
+constexpr int kMissesInARow = 3;
 // A width of the posterior over the prior's beyond which the readings say next to nothing.
 constexpr double kUntold = 0.8;
 // Standard error of a mean, in sd, that more runs are asked for to reach.
@@ -112,6 +116,39 @@ std::string WhyUnfit(const ResponseQuality& quality) {
         std::max(0.0, 100 * quality.explained));
   }
   return "";
+}
+
+// The readings' distance at the draw of the posterior that is nearest to them, in sd of all that is
+// known to part them.
+struct Miss {
+  double rms = 0;     ///< of coordinates
+  double chance = 1;  ///< of as large a one, by Fisher's law
+};
+
+Miss MissOf(const ResponseEmulator& emulator, const AdaptivePosterior& posterior) {
+  const EmulatorPrediction prediction = emulator.Predict(posterior.standard);
+  const Eigen::MatrixXd variance = DiagonalVariance(prediction, emulator.errors());
+  const double least =
+      ((prediction.mean.rowwise() - emulator.measured().transpose()).array().square() /
+       variance.array().max(1e-300))
+          .rowwise()
+          .sum()
+          .minCoeff();
+  const auto q = static_cast<double>(emulator.coordinates());
+  const double fitted = static_cast<double>(posterior.mean.size());
+  const double freedom = std::max(1.0, q - fitted);
+  return {.rms = std::sqrt(least / q),
+          .chance = FisherLaw{.numerator = freedom,
+                              .denominator = static_cast<double>(emulator.quality().complete) / 2}
+                        .Tail(least / freedom)};
+}
+
+// Whether a mean stays uncertain up to max_runs, its error falling with the root of the runs.
+bool StaysUncertain(const AdaptivePosterior& posterior, Index runs,
+                    const AdaptiveOptions& options) {
+  const double falls = std::sqrt(static_cast<double>(runs) / options.max_runs);
+  return (posterior.mean_error.array() / posterior.sd.array().max(1e-300)).maxCoeff() * falls >
+         options.mean_error;
 }
 
 // What is uncertain, and what more runs would bring.
@@ -286,10 +323,27 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   // An emulator that is not fit yet may be with more runs; without a signal it never will.
   if (!unfit.empty() && (ends || emulator->quality().explained < kLeastPredicted))
     return Refused(unfit, true);
+  const Miss miss = MissOf(*emulator, posterior);
+  if (unfit.empty() && miss.chance < kLeastMissChance &&
+      StaysUncertain(posterior, runs.rows(), options)) {
+    const AdaptiveMemory& before = earlier.back();
+    result.memory.missing = before.missing + (before.batches < ended ? 1 : 0);
+  }
   const std::string uncertain = WhatIsUncertain(posterior, runs.rows(), options.names);
   if (result.verification.passed && settled && known && unfit.empty()) {
     result.posterior = std::move(posterior);
     return end(AdaptiveStage::kConverged, uncertain.empty() ? "" : uncertain.substr(1));
+  }
+  if (result.memory.missing >= kMissesInARow) {
+    result.posterior = std::move(posterior);
+    return end(
+        AdaptiveStage::kNotConverged,
+        absl::StrFormat(
+            "Ended after %d runs: the model misses the readings by %.1f sd of noise, scatter "
+            "and what the emulator does not know together (chance %.0e), and up to %d runs "
+            "no posterior would come of it. Where it fails and which effect it lacks are the "
+            "questions before that of its parameters.",
+            runs.rows(), miss.rms, miss.chance, options.max_runs));
   }
   if (ends) {
     result.posterior = std::move(posterior);

@@ -41,7 +41,7 @@ enum class AdaptiveStage {
   kSearching,     ///< runs go where the posterior is least certain
   kVerifying,     ///< fresh runs of the posterior, to be predicted
   kConverged,     ///< ended: settled, and the fresh runs were predicted
-  kNotConverged,  ///< ended at max_runs
+  kNotConverged,  ///< ended at max_runs, or where more runs would be for nothing
   kRefused,       ///< ended: no posterior can be had so
 };
 
@@ -50,6 +50,8 @@ struct AdaptiveMemory {
   AdaptiveStage stage = AdaptiveStage::kFirst;
   Eigen::VectorXd mean{}, sd{};  ///< d, standardised; empty where there was no posterior
   int batches = 0;               ///< that had ended when it was taken
+  int missing = 0;               ///< decisions in a row, this one last, by which the model misses
+                                 ///< the readings and more runs would be for nothing
 };
 
 /// Fresh runs of the posterior against what was predicted of them before.
@@ -92,7 +94,12 @@ bool MayOverlap(std::span<const AdaptiveMemory> earlier);
 /// batches than the one before, and whose means are known well enough (a mean may rest where the
 /// emulator is wrong); then `verify` draws of it are run and predicted (Fisher's chi-squared above
 /// one in a thousand, and at least seven tenths of the coordinates in their 90 % intervals). The
-/// last runs of max_runs are kept for that. Refused: max_runs below LeastMaxRuns; no first run
+/// last runs of max_runs are kept for that. It also ends where three decisions in a row found that
+/// the model misses the readings (a chance below one in a million of as large a distance at the
+/// best draw, by noise, scatter and what the emulator does not know) and that a mean would be known
+/// worse than to mean_error after max_runs, its error falling with the root of the runs: the error
+/// of a slope times a distance that no parameter closes moves the posterior, and no run mends it.
+/// Refused: max_runs below LeastMaxRuns; no first run
 /// complete, or too few; scatter that leaves no signal; runs that are missed by more than repeats
 /// of them differ, or than the emulator claims. Deterministic in the arguments. Pure. in: all, runs
 /// so far; earlier, of each batch so far the memory of the decision that asked for it, in order

@@ -84,11 +84,10 @@ absl::StatusOr<std::string> ReadAllOf(const std::string& path, bool secret) {
 /// Calls `take` until it gives 0, or says that it never will.
 template <typename Take>
 absl::Status WaitForLock(const std::string& folder, const std::string& path, const Take& take) {
-  const absl::Time end = absl::Now() + kLongestWait;
-  for (;;) {
+  for (absl::Duration waited;; waited += kLockPause) {  // no clock that may be set meanwhile
     if (take() == 0) return absl::OkStatus();
     if (errno != EAGAIN && errno != EACCES && errno != EINTR) return CannotWrite(path, errno);
-    if (absl::Now() > end) {
+    if (waited > kLongestWait) {
       return absl::ResourceExhaustedError(
           absl::StrCat("another process has been working on ", folder, " for ",
                        absl::FormatDuration(kLongestWait), ": try again when it has ended"));

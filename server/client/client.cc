@@ -58,7 +58,7 @@ struct Connection {
 
   /// After the server was lost: true once it, or who took its place, can be asked.
   bool Return() {
-    const auto end = std::chrono::system_clock::now() + kReturn;
+    const auto end = std::chrono::steady_clock::now() + kReturn;
     do {
       std::this_thread::sleep_for(kLull);
       if (Interrupted()) return false;
@@ -69,7 +69,7 @@ struct Connection {
         if (!is_here && !Open(found).ok()) return false;
       }
       if (channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) return true;
-    } while (std::chrono::system_clock::now() < end);
+    } while (std::chrono::steady_clock::now() < end);
     return false;
   }
 

@@ -1,6 +1,7 @@
 #include "server/store/store.h"
 
 #include <algorithm>
+#include <chrono>
 #include <deque>
 #include <filesystem>
 #include <future>
@@ -13,6 +14,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "calib/return_if_error.h"
 #include "server/store/connection.h"
@@ -95,6 +97,22 @@ class Store::Writer {
     }
   }
 
+  /// Whether it is to end within this time. By naps: a timed wait of absl::Mutex goes by the wall
+  /// clock, and lasts as much longer as that is set back meanwhile.
+  bool EndsWithin(std::chrono::milliseconds time) {
+    constexpr absl::Duration kNap = absl::Milliseconds(20);
+    const auto until = std::chrono::steady_clock::now() + time;
+    for (;;) {
+      {
+        absl::MutexLock lock(&mutex_);
+        if (IsEnding()) return true;
+      }
+      const auto left = absl::FromChrono(until - std::chrono::steady_clock::now());
+      if (left <= absl::ZeroDuration()) return false;
+      absl::SleepFor(std::min(kNap, left));
+    }
+  }
+
   /// Tries again for as long as the disk has no room; CANCELLED: that was not to be waited for.
   absl::Status CommitOnceThereIsRoom(std::vector<Entry>& group) {
     absl::Status status = Commit(group);
@@ -106,14 +124,13 @@ class Store::Writer {
     }
     Tell(status);
     while (absl::IsResourceExhausted(status)) {
+      if (EndsWithin(hooks_.between_tries)) {
+        return absl::CancelledError(
+            absl::StrCat("not written, for the server ends: ", status.message()));
+      }
       std::vector<Entry> refused;
       {
         absl::MutexLock lock(&mutex_);
-        if (mutex_.AwaitWithTimeout(absl::Condition(this, &Writer::IsEnding),
-                                    absl::FromChrono(hooks_.between_tries))) {
-          return absl::CancelledError(
-              absl::StrCat("not written, for the server ends: ", status.message()));
-        }
         const auto waiting = std::stable_partition(
             queue_.begin(), queue_.end(), [](const Entry& entry) { return !entry.waits_for_room; });
         std::move(queue_.begin(), waiting, std::back_inserter(refused));

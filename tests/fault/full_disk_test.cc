@@ -2,10 +2,7 @@
 // own is mounted for each test, in a mount namespace that only this process and its children see.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
-#include <sys/mount.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
@@ -22,6 +19,7 @@
 #include "server/store/migrations.h"
 #include "server/store/store.h"
 #include "tests/fault/undisturbed.h"
+#include "tests/support/small_disk.h"
 
 namespace calib::testing {
 namespace {
@@ -30,56 +28,6 @@ using ::testing::HasSubstr;
 
 constexpr const char* kFull = "the disk of the state folder takes nothing since ";
 constexpr const char* kGoesOn = "the server goes on by itself when it does";
-
-void WriteTo(const std::string& path, const std::string& text) { std::ofstream(path) << text; }
-
-/// From now on what this thread and its children mount is seen by them alone. False: this account
-/// may not, with root's rights or without.
-bool HaveOwnMounts() {
-  const std::string user = std::to_string(getuid());
-  const std::string group = std::to_string(getgid());
-  if (unshare(CLONE_NEWNS) != 0) {
-    if (unshare(CLONE_NEWUSER | CLONE_NEWNS) != 0) return false;
-    WriteTo("/proc/self/setgroups", "deny");
-    WriteTo("/proc/self/uid_map", "0 " + user + " 1");
-    WriteTo("/proc/self/gid_map", "0 " + group + " 1");
-  }
-  return mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0;
-}
-
-/// A file system in memory, at a folder.
-class SmallDisk {
- public:
-  explicit SmallDisk(std::string folder, int mebibytes) : folder_(std::move(folder)) {
-    std::filesystem::create_directories(folder_);
-    const std::string size =
-        "size=" + std::to_string(mebibytes) + "m,mode=0700";  // a state folder is its account's
-    mounted_ = mount("tmpfs", folder_.c_str(), "tmpfs", 0, size.c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) umount2(folder_.c_str(), MNT_DETACH);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  bool mounted() const { return mounted_; }
-  /// Until nothing more goes onto it.
-  void Fill() const {
-    for (const std::size_t piece : {std::size_t{1} << 16U, std::size_t{1} << 12U}) {
-      std::ofstream ballast(Ballast(), std::ios::app | std::ios::binary);
-      const std::string zeros(piece, '\0');
-      while (ballast.write(zeros.data(), static_cast<std::streamsize>(piece)).flush()) {
-      }
-    }
-  }
-  void MakeRoom() const { std::filesystem::remove(Ballast()); }
-
- private:
-  std::string Ballast() const { return folder_ + "/ballast"; }
-
-  std::string folder_;
-  bool mounted_ = false;
-};
 
 std::string TextOf(const std::string& file) {
   std::ostringstream text;

@@ -200,6 +200,16 @@ def calls_of_libm(tree, rules):
                     yield f'{path}:{number}: dem may not call libm: another processor would give other bits (dem/elementary)'
 
 
+def waits_by_the_wall_clock(tree, rules):
+    """Timed waits of Abseil's locks go by the wall clock, and last as much longer as that is set back: naps beside a steady clock."""
+    del rules
+    for path in tree.sources('.h', '.cc'):
+        if path.startswith(('proto/', 'server/', 'worker/')):
+            for number, line in enumerate(tree.lines(path), 1):
+                if re.search(r'\b(Await|Wait|WaitForNotification|LockWhen)With(Timeout|Deadline)\b', line):
+                    yield f'{path}:{number}: waits by the wall clock, which may be set back'
+
+
 def is_row(line):
     return line.lstrip().startswith('|') or re.fullmatch(r'\s*([-*] )?(!?\[[^]]*\]\([^)]*\)|\[[^]]*\]: *\S+|<?https?://\S+)[.,;]?\s*', line)
 
@@ -254,7 +264,7 @@ def too_many_words(tree, rules):
         yield f'{total} words of Markdown, at most {rules.MOST_WORDS} (longest: {longest})'
 
 
-RULES = (unknown_folders, wrong_arrows, cycles, named_methods, full_folders, impure_libraries, calls_of_libm, readmes, missing_doors, too_many_words)
+RULES = (unknown_folders, wrong_arrows, cycles, named_methods, full_folders, impure_libraries, calls_of_libm, waits_by_the_wall_clock, readmes, missing_doors, too_many_words)
 
 
 def offences(root, rules=house):

@@ -128,6 +128,9 @@ class CheckLayers(unittest.TestCase):
         self.says({'dem/ground/n.h': 'double F(double x) { return 1 + std::exp(x); }\n'}, 'dem/ground/n.h:1: dem may not call libm')
         self.says({'dem/ground/n.h': 'double F(double x) { return 1 + pow(x, 3); }\n'}, 'dem may not call libm')
 
+    def test_no_wait_by_the_wall_clock(self):
+        self.says({'server/client/l.h': 'bool w = mutex.AwaitWithTimeout(c, t);\n'}, 'server/client/l.h:1: waits by the wall clock')
+
     def test_a_readme_that_is_too_long(self):
         self.says({'dem/left/README.md': 'x\n' * 7}, 'dem/left/README.md: 7 lines, at most 6')
         self.says({'README.md': 'x\n' * 9}, 'README.md: 9 lines, at most 8')

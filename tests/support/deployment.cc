@@ -28,6 +28,11 @@ bool Deployment::StartServer() {
                                    "--heartbeat-ms",
                                    std::to_string(options_.heartbeat_ms)};
   command.insert(command.end(), options_.server_options.begin(), options_.server_options.end());
+  if (!options_.server_environment.empty()) {
+    command.insert(command.begin(), options_.server_environment.begin(),
+                   options_.server_environment.end());
+    command.insert(command.begin(), "/usr/bin/env");
+  }
   if (options_.open_files > 0) {
     command.insert(command.begin(),
                    {"/bin/sh", "-c",
@@ -50,6 +55,10 @@ void Deployment::StartWorker(int slots, const std::vector<std::string>& options)
       Program("calib-worker"),         "--server", address_, "--slots",
       std::to_string(slots),           "--name",   name,     "--checkpoints",
       folder_ + "/checkpoints-" + name};
+  if (!address_for_workers_.empty()) {
+    command[2] = address_for_workers_;
+    command.insert(command.end(), {"--token", state() + "/token"});
+  }
   command.insert(command.end(), options.begin(), options.end());
   workers_.emplace_back(command, folder_ + "/" + name + ".log");
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/client.h"
@@ -15,7 +16,9 @@ struct DeploymentOptions {
   int lease_ms = 3000;
   int heartbeat_ms = 100;
   std::vector<std::string> server_options{};  ///< further ones of calibd
-  int open_files = 0;                         ///< that the server may have; 0: as many as the test
+  /// NAME=VALUE, of the server's environment.
+  std::vector<std::string> server_environment{};
+  int open_files = 0;  ///< that the server may have; 0: as many as the test
 };
 
 /// Everything in one fresh folder: state, logs. Children are killed with it.
@@ -28,6 +31,8 @@ class Deployment {
   bool StartServer();
   /// options: further ones of calib-worker.
   void StartWorker(int slots = 1, const std::vector<std::string>& options = {});
+  /// Workers that are started from now on are told this address, with the token of this server.
+  void SetAddressForWorkers(std::string address) { address_for_workers_ = std::move(address); }
 
   Process& server() { return *server_; }
   std::vector<Process>& workers() { return workers_; }
@@ -42,6 +47,7 @@ class Deployment {
   const DeploymentOptions options_;
   const std::string folder_;
   std::string address_ = "127.0.0.1:0";
+  std::string address_for_workers_{};  // empty: that of the server
   int started_workers_ = 0;
   std::unique_ptr<Process> server_;
   std::vector<Process> workers_;

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -11,6 +12,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "calib/return_if_error.h"
 #include "proto/rpc/digest.h"
 #include "worker/program/request.h"
@@ -368,17 +371,14 @@ void Programs::GiveBack(const std::string& identity, std::unique_ptr<RunningProg
 }
 
 void Programs::EndUnused(const std::stop_token& stop) {
-  constexpr std::chrono::milliseconds kOften{500};
+  // No timed wait of absl::CondVar: it goes by the wall clock, which may be set back.
+  constexpr absl::Duration kNap = absl::Milliseconds(50);
   while (!stop.stop_requested()) {
     std::list<Idle> unused;
     {
       const absl::MutexLock lock(&mutex_);
       if (stop.stop_requested()) return;
-      if (idle_.empty()) {
-        changed_.Wait(&mutex_);
-      } else {
-        changed_.WaitWithTimeout(&mutex_, absl::FromChrono(kOften));
-      }
+      if (idle_.empty()) changed_.Wait(&mutex_);
       const auto now = std::chrono::steady_clock::now();
       for (auto idle = idle_.begin(); idle != idle_.end();) {
         const auto next = std::next(idle);
@@ -389,6 +389,7 @@ void Programs::EndUnused(const std::stop_token& stop) {
       }
     }
     for (Idle& idle : unused) idle.program->End();
+    absl::SleepFor(kNap);
   }
 }
 

@@ -102,6 +102,7 @@ std::string ToText(const Memory& memory) {
               {"mean", planning::VectorToJson(memory.of_decision.mean)},
               {"sd", planning::VectorToJson(memory.of_decision.sd)},
               {"batches", memory.of_decision.batches},
+              {"missing", memory.of_decision.missing},
               {"expected_gain", memory.expected_gain}}
       .dump();
 }
@@ -112,9 +113,10 @@ absl::StatusOr<Memory> FromText(const std::string& text, int number) {
     const Json json = Json::parse(text);
     const auto stage = campaign::ValueOf(kStageWords, json.at("stage").get<std::string>());
     if (!stage) return absl::DataLossError("a stored batch is of a stage that nobody knows");
-    return Memory{{*stage, planning::VectorFromJson(json.at("mean")),
-                   planning::VectorFromJson(json.at("sd")), json.value("batches", number)},
-                  json.at("expected_gain").get<double>()};
+    return Memory{
+        {*stage, planning::VectorFromJson(json.at("mean")), planning::VectorFromJson(json.at("sd")),
+         json.value("batches", number), json.value("missing", 0)},
+        json.at("expected_gain").get<double>()};
   } catch (const Json::exception& error) {
     return absl::DataLossError(absl::StrCat("stored batch: ", error.what()));
   }
@@ -281,8 +283,7 @@ class AdaptivePlanner final : public planning::Planner {
   planning::Batch BatchOf(const inference::AdaptiveDecision& decision, int iteration,
                           int made) const {
     planning::Batch batch{
-        .proposal = ToText({.of_decision = {decision.stage, decision.memory.mean,
-                                            decision.memory.sd, decision.memory.batches},
+        .proposal = ToText({.of_decision = decision.memory,
                             .expected_gain = iteration == 0 ? 0 : decision.next.expected_gain}),
         .parameters = decision.next.parameters,
         .stop_below = std::vector<double>(decision.next.packing.size(), store::kUnknown),

@@ -389,6 +389,33 @@ TEST(AdaptiveDecision, SaysThatAModelCannotBeFollowedAndProposesTheFilter) {
   EXPECT_THAT(decision->reason, HasSubstr("cannot follow"));
 }
 
+// A measurement off a bent model by as many sd in a direction that no parameter moves it.
+AdaptiveToy OffTheModel(double distance) {
+  AdaptiveToy toy(
+      UnitSquare(),
+      [](const VectorXd& x) -> VectorXd {
+        VectorXd y(6);
+        y << x[0], x[1], x[0] * x[1], std::sin(3 * x[0]), x[1] * x[1], 0;
+        return 12 * y;
+      },
+      6, 12);
+  toy.MeasureAt(Eigen::Vector2d(0.5, 0.5));
+  toy.problem().measured[5] += distance;
+  toy.problem().measured[3] -= distance;
+  toy.problem().measured[2] += distance;
+  return toy;
+}
+
+TEST(AdaptiveDecision, EndsWhereTheModelMissesTheReadingsAndNoRunHelps) {
+  const AdaptiveLoop far = Calibrate(OffTheModel(40), {.max_runs = 150, .seed = 3});
+  EXPECT_EQ(far.decision.stage, AdaptiveStage::kNotConverged);
+  EXPECT_LT(far.runs.rows(), 100);
+  EXPECT_THAT(far.decision.reason, HasSubstr("the model misses the readings by "));
+  EXPECT_TRUE(far.decision.posterior);
+  const AdaptiveLoop near = Calibrate(OffTheModel(3), {.max_runs = 150, .seed = 3});
+  EXPECT_EQ(near.decision.stage, AdaptiveStage::kConverged) << near.decision.reason;
+}
+
 TEST(AdaptiveDecision, RefusesWhatDoesNotFit) {
   const AdaptiveToy toy = Bent(11);
   AdaptiveRuns runs = Filled(toy, 20);
