@@ -29,6 +29,8 @@ using ::testing::HasSubstr;
 constexpr const char* kFull = "the disk of the state folder takes nothing since ";
 constexpr const char* kGoesOn = "the server goes on by itself when it does";
 
+void WriteTo(const std::string& path, const std::string& text) { std::ofstream(path) << text; }
+
 std::string TextOf(const std::string& file) {
   std::ostringstream text;
   text << std::ifstream(file).rdbuf();
