@@ -318,7 +318,7 @@ void Judge(const EmulatorOptions& options, EmulatedResult& result) {
     result.reason = absl::StrFormat(
         "The emulated posterior lies where few runs are: the mean history of the model is known "
         "there to %.1f standard deviations of the readings' noise only (limit %g), and what is not "
-        "known excuses misfit. Run more iterations, or more samples in each.",
+        "known excuses misfit. Runs there would tell, unless the model misses the readings.",
         result.emulator_sd, options.max_unknown);
   } else {
     result.adequate = true;
