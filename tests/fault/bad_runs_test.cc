@@ -40,13 +40,13 @@ for k, x in enumerate(request["control"]["values"]):
 
 std::string BadCampaign() {
   return absl::StrCat("name: bad\nmodel:\n  command: [", kPython, ", p.py]\n  files: [p.py]\n",
-                      "  limits: {silence: 2 s}\n",
+                      "  limits: {silence: 5 s}\n",
                       "parameters:\n  a: {prior: normal, mean: 1, sd: 0.3}\n",
                       "experiments:\n  - name: line\n    data: {file: line.csv}\n    control: x\n",
                       "    observables: {y: {noise: {absolute: 0.3}}}\n",
                       "inference: {method: iterative_bayesian_filter, samples: ", kSamples,
                       ", max_iterations: 1}\nfailure: {attempts: ", kAttempts,
-                      ", pause_above: 0.9}\n", "resources: {memory: 300 MB}\nseed: 5\n");
+                      ", pause_above: 0.9}\n", "resources: {memory: 60 MB}\nseed: 5\n");
 }
 
 /// The engines of a worker.
@@ -103,12 +103,13 @@ TEST(BadRuns, EndAloneBesideGoodOnesOfTwoCampaignsOnOneWorker) {
   for (const v1::SampleStates& of_sample : *states) states_of[of_sample.sample()] = &of_sample;
   const std::map<int, std::string> reasons = {{0, "ended by SIGSEGV"},
                                               {1, "came to its memory limit: "},
-                                              {2, "came to its silence limit: no state for 2 s"},
+                                              {2, "came to its silence limit: no state for 5 s"},
                                               {3, "exit 7 with 1 of 3 states: the mesh is broken"}};
   std::map<int, int> seen;
   for (const v1::Sample& sample : *samples) {
     ASSERT_EQ(states_of.count(sample.index()), 1U);
     const v1::SampleStates& of_sample = *states_of[sample.index()];
+    ASSERT_GT(of_sample.states_size(), 0) << sample.reason();
     const int fault = static_cast<int>(of_sample.states(0).others().at("fault"));
     ++seen[fault];
     const auto reason = reasons.find(fault);

@@ -151,7 +151,7 @@ class RunningProgram::Talk {
   }
 
   bool IsAtLimit(TalkClock::time_point now) {
-    if (std::string time = limits_.AtTime(now); !time.empty()) limit_ = std::move(time);
+    if (limit_.empty()) limit_ = limits_.AtTime(now);
     return !limit_.empty();
   }
 
