@@ -34,9 +34,11 @@ constexpr double kLeastRepeatsChance = 1e-3;
 // four repeats and several coordinates chance makes less than four.
 constexpr double kSharpDifference = 4;
 // Chance below which the model misses the readings: of a thousand calibrations of a right model,
-// of twenty-five decisions each, one in forty meets it by chance; and how often in a row.
+// of twenty-five decisions each, one in forty meets it by chance.
 constexpr double kLeastMissChance = 1e-6;
-constexpr int kMissesInARow = 3;
+// Decisions in a row that must find that more runs are for nothing: two batches apart, as for what
+// has settled.
+constexpr int kForNothing = 3;
 // A width of the posterior over the prior's beyond which the readings say next to nothing.
 constexpr double kUntold = 0.8;
 // Standard error of a mean, in sd, that more runs are asked for to reach.
@@ -324,17 +326,19 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
   if (!unfit.empty() && (ends || emulator->quality().explained < kLeastPredicted))
     return Refused(unfit, true);
   const Miss miss = MissOf(*emulator, posterior);
-  if (unfit.empty() && miss.chance < kLeastMissChance &&
-      StaysUncertain(posterior, runs.rows(), options)) {
+  if (unfit.empty() && StaysUncertain(posterior, runs.rows(), options)) {
     const AdaptiveMemory& before = earlier.back();
-    result.memory.missing = before.missing + (before.batches < ended ? 1 : 0);
+    const int more = before.batches < ended ? 1 : 0;
+    result.memory.uncertain = before.uncertain + more;
+    if (miss.chance < kLeastMissChance) result.memory.missing = before.missing + more;
   }
+  const bool for_nothing = result.memory.uncertain >= kForNothing;
   const std::string uncertain = WhatIsUncertain(posterior, runs.rows(), options.names);
   if (result.verification.passed && settled && known && unfit.empty()) {
     result.posterior = std::move(posterior);
     return end(AdaptiveStage::kConverged, uncertain.empty() ? "" : uncertain.substr(1));
   }
-  if (result.memory.missing >= kMissesInARow) {
+  if (result.memory.missing >= kForNothing) {
     result.posterior = std::move(posterior);
     return end(
         AdaptiveStage::kNotConverged,
@@ -344,6 +348,15 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
             "no posterior would come of it. Where it fails and which effect it lacks are the "
             "questions before that of its parameters.",
             runs.rows(), miss.rms, miss.chance, options.max_runs));
+  }
+  if (result.verification.passed && settled && for_nothing) {
+    result.posterior = std::move(posterior);
+    return end(
+        AdaptiveStage::kNotConverged,
+        absl::StrFormat("Ended after %d runs: the posterior has settled and fresh runs of it "
+                        "were predicted, but up to %d runs not all means would be known to "
+                        "%.2f sd. That error is in the intervals.%s",
+                        runs.rows(), options.max_runs, options.mean_error, uncertain));
   }
   if (ends) {
     result.posterior = std::move(posterior);
@@ -366,8 +379,9 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
 
   const bool just_failed = earlier.back().stage == AdaptiveStage::kVerifying;
   const bool last = left < options.batch + options.verify;
-  const bool verify = unfit.empty() && left >= options.verify &&
-                      ((settled && settled_before && known && !just_failed) || last);
+  const bool verify =
+      unfit.empty() && left >= options.verify &&
+      ((settled && settled_before && (known || for_nothing) && !just_failed) || last);
   if (verify) {
     result.stage = AdaptiveStage::kVerifying;
     result.next = VerifyingRuns(problem, all, posterior, options.verify);

@@ -50,8 +50,9 @@ struct AdaptiveMemory {
   AdaptiveStage stage = AdaptiveStage::kFirst;
   Eigen::VectorXd mean{}, sd{};  ///< d, standardised; empty where there was no posterior
   int batches = 0;               ///< that had ended when it was taken
-  int missing = 0;               ///< decisions in a row, this one last, by which the model misses
-                                 ///< the readings and more runs would be for nothing
+  int uncertain = 0;             ///< decisions in a row, this one last, by which a mean will be
+                                 ///< known worse than to mean_error after max_runs
+  int missing = 0;               ///< and by which the model misses the readings as well
 };
 
 /// Fresh runs of the posterior against what was predicted of them before.
@@ -94,11 +95,13 @@ bool MayOverlap(std::span<const AdaptiveMemory> earlier);
 /// batches than the one before, and whose means are known well enough (a mean may rest where the
 /// emulator is wrong); then `verify` draws of it are run and predicted (Fisher's chi-squared above
 /// one in a thousand, and at least seven tenths of the coordinates in their 90 % intervals). The
-/// last runs of max_runs are kept for that. It also ends where three decisions in a row found that
-/// the model misses the readings (a chance below one in a million of as large a distance at the
-/// best draw, by noise, scatter and what the emulator does not know) and that a mean would be known
-/// worse than to mean_error after max_runs, its error falling with the root of the runs: the error
-/// of a slope times a distance that no parameter closes moves the posterior, and no run mends it.
+/// last runs of max_runs are kept for that. It also ends, not converged, where three decisions in a
+/// row found that a mean would be known worse than to mean_error after max_runs, its error falling
+/// with the root of the runs, and either the posterior has settled and fresh runs of it were
+/// predicted (the error is in its widths, and the runs that are left would not take it out), or all
+/// three found that the model misses the readings (a chance below one in a million of as large a
+/// distance at the best draw, by noise, scatter and what the emulator does not know): the error of
+/// a slope times a distance that no parameter closes moves the posterior, and no run mends it.
 /// Refused: max_runs below LeastMaxRuns; no first run
 /// complete, or too few; scatter that leaves no signal; runs that are missed by more than repeats
 /// of them differ, or than the emulator claims. Deterministic in the arguments. Pure. in: all, runs

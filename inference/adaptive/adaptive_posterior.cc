@@ -95,8 +95,7 @@ void AddErrors(const ResponseEmulator& emulator, const AdaptiveSamplingOptions& 
   const Index m = at.rows(), q = emulator.coordinates(), d = at.cols();
   const EmulatorPrediction prediction = emulator.Predict(at);
   std::vector<Eigen::MatrixXd> root;
-  for (Index k = 0; k < q; ++k) {
-    Eigen::MatrixXd covariance = emulator.Covariance(k, at, at);
+  for (Eigen::MatrixXd& covariance : emulator.Covariances(at, at)) {
     // Rounding, and rows drawn twice.
     covariance.diagonal().array() += 1e-10 + 1e-8 * covariance.diagonal().maxCoeff();
     root.emplace_back(Eigen::LLT<Eigen::MatrixXd>(covariance).matrixL());

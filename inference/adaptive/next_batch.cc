@@ -98,10 +98,8 @@ class ExpectedVariance {
       weight_[i] = -std::max(posterior.log_mean[row], posterior.log_root_square[row]);
     }
     weight_.array() -= weight_.minCoeff();
-    for (Index k = 0; k < emulator.coordinates(); ++k) {
-      with_points_.push_back(emulator.Covariance(k, points, candidates));
-      between_.push_back(emulator.Covariance(k, candidates, candidates));
-    }
+    with_points_ = emulator.Covariances(points, candidates);
+    between_ = emulator.Covariances(candidates, candidates);
   }
 
   // The integral of E_D[E[L | D]^2] with this candidate beside those taken, but for a factor.

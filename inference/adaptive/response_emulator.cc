@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -10,7 +11,9 @@
 #include "inference/emulator/stopped_runs.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/numerics/infinity.h"
+#include "inference/numerics/log_weights.h"
 #include "inference/numerics/special_functions.h"
+#include "inference/sampling/philox.h"
 #include "inference/scatter/shrunk_covariance.h"
 
 namespace calib::inference {
@@ -46,13 +49,44 @@ absl::StatusOr<std::vector<FeatureEmulator>> FitPolynomials(const Eigen::MatrixX
   return result;
 }
 
-// ln of the density of errors by their variances, without the constant; over these rows.
-double LogDensityOf(const Eigen::VectorXd& error, const Eigen::VectorXd& variance,
-                    const std::vector<Index>& rows) {
-  double sum = 0;
-  for (const Index i : rows)
-    sum -= 0.5 * (error[i] * error[i] / variance[i] + std::log(variance[i]));
-  return sum;
+// Errors of runs left out and their variances by several emulators, n x m; no finite variance where
+// there is no such emulator.
+struct LeftOut {
+  Eigen::ArrayXXd error, variance;
+};
+
+// Weights of emulators by the log density of runs left out: the mean, over resampled runs, of those
+// proportional to the density of them all.    [Yao et al., Bayesian Anal. 13 (2018) 917, sec. 3.4]
+Eigen::VectorXd WeightsOf(const LeftOut& left, const std::vector<Index>& runs) {
+  constexpr int kResampled = 400;        // weights are known to a few percent
+  constexpr double kLeastWeight = 1e-3;  // far below that
+  const Eigen::ArrayXXd error = left.error(runs, Eigen::all);
+  const Eigen::ArrayXXd variance = left.variance(runs, Eigen::all);
+  Eigen::MatrixXd density = (-0.5 * (error.square() / variance + variance.log())).matrix();
+  for (double& value : density.reshaped()) {
+    if (!std::isfinite(value)) value = -kInfinity;
+  }
+  const auto count = static_cast<Index>(runs.size());
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(density.cols());
+  if (!(density.colwise().sum().maxCoeff() > -kInfinity)) {
+    result[0] = 1;  // none has a density at every run: the simplest
+    return result;
+  }
+  for (int b = 0; b < kResampled; ++b) {
+    // The same for every coordinate and decision, so that weights move by what is learned alone.
+    PhiloxStream stream({.seed = 0,
+                         .purpose = StreamPurpose::kAdaptiveErrors,
+                         .iteration = std::numeric_limits<std::uint64_t>::max(),  // no decision's
+                         .sample = static_cast<std::uint64_t>(b)});
+    Eigen::VectorXd times(count);
+    for (double& value : times) value = -std::log(1 - stream.Uniform());
+    times *= static_cast<double>(count) / times.sum();
+    const Eigen::VectorXd sum = density.transpose() * times;
+    result += NormalizedLogWeights(sum).array().exp().matrix();
+  }
+  result /= result.sum();
+  result = (result.array() < kLeastWeight).select(0, result);
+  return result / result.sum();
 }
 
 // Rows of the least distances, ascending.
@@ -211,14 +245,14 @@ absl::StatusOr<ResponseEmulator> ResponseEmulator::Fit(const AdaptiveProblem& pr
     if (process.ok()) result.processes_.back() = *std::move(process);
   }
   result.quality_ = {.complete = learned.complete, .early = n - learned.complete};
-  result.Choose(learned.inputs, outputs, learned.packing);
+  result.Weigh(learned.inputs, outputs, learned.packing);
   result.CompareWithRepeats(learned.inputs.topRows(learned.complete),
                             outputs.topRows(learned.complete));
   return result;
 }
 
-void ResponseEmulator::Choose(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
-                              const std::vector<int>& packing) {
+void ResponseEmulator::Weigh(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
+                             const std::vector<int>& packing) {
   const Index n = inputs.rows(), q = outputs.cols();
   const FeatureEmulator& all = BestOf(polynomials_);
   const Eigen::MatrixXd left_out = outputs - all.left_out().error;
@@ -248,36 +282,42 @@ void ResponseEmulator::Choose(const Eigen::MatrixXd& inputs, const Eigen::Matrix
   double inverse = 0, inverse_of_scatter = 0;
   quality_.explained = -kInfinity;
   quality_.calibration = 0;
+  const auto degrees = static_cast<Index>(polynomials_.size());
+  weights_.resize(q, degrees + 1);
   for (Index k = 0; k < q; ++k) {
-    double best = -kInfinity, run = 0, specimen = 0;
-    Eigen::VectorXd error, variance;
-    int chosen = 0;
-    const auto consider = [&](int degree, const Eigen::VectorXd& e, const Eigen::VectorXd& v) {
-      const double density = LogDensityOf(e, v, relevant);
-      if (!(density > best)) return;
-      best = density;
-      error = e;
-      variance = v;
-      chosen = degree;
-    };
-    for (std::size_t g = 0; g < polynomials_.size(); ++g) {
-      const LeftOutRuns& left = polynomials_[g].left_out();
-      consider(static_cast<int>(g), left.error.col(k), left.variance.col(k));
+    LeftOut left{.error = Eigen::ArrayXXd::Zero(n, degrees + 1),
+                 .variance = Eigen::ArrayXXd::Constant(n, degrees + 1, kInfinity)};
+    Eigen::VectorXd run_of = Eigen::VectorXd::Zero(degrees + 1);
+    Eigen::VectorXd specimen_of = run_of, freedom_of = run_of;
+    for (Index g = 0; g < degrees; ++g) {
+      const FeatureEmulator& polynomial = polynomials_[static_cast<std::size_t>(g)];
+      left.error.col(g) = polynomial.left_out().error.col(k);
+      left.variance.col(g) = polynomial.left_out().variance.col(k);
+      run_of[g] = polynomial.variances().run[k];
+      specimen_of[g] = polynomial.specimen()[k];
+      freedom_of[g] =
+          std::max(static_cast<double>(n) - polynomial.used(), 0.3 * static_cast<double>(n));
     }
-    const std::optional<GaussianProcess>& process = processes_[static_cast<std::size_t>(k)];
-    if (process) consider(-1, process->leave_one_out().error, process->leave_one_out().variance);
-    degree_.push_back(chosen);
-    double freedom = 0;
-    if (chosen < 0) {
-      run = process->scatter_variance();
-      specimen = run + process->group_variance();
-      freedom = 0.5 * static_cast<double>(n);  // the process may bend as often as every other run
-    } else {
-      const FeatureEmulator& polynomial = polynomials_[static_cast<std::size_t>(chosen)];
-      run = polynomial.variances().run[k];
-      specimen = polynomial.specimen()[k];
-      freedom = std::max(static_cast<double>(n) - polynomial.used(), 0.3 * static_cast<double>(n));
+    if (const auto& process = processes_[static_cast<std::size_t>(k)]) {
+      left.error.col(degrees) = process->leave_one_out().error;
+      left.variance.col(degrees) = process->leave_one_out().variance;
+      run_of[degrees] = process->scatter_variance();
+      specimen_of[degrees] = process->scatter_variance() + process->group_variance();
+      // It may bend as often as every other run.
+      freedom_of[degrees] = 0.5 * static_cast<double>(n);
     }
+    const Eigen::VectorXd weight = WeightsOf(left, relevant);
+    weights_.row(k) = weight.transpose();
+    Eigen::VectorXd error = Eigen::VectorXd::Zero(n), variance = error;
+    for (Index g = 0; g <= degrees; ++g)
+      if (weight[g] > 0) error += weight[g] * left.error.col(g).matrix();
+    for (Index g = 0; g <= degrees; ++g) {
+      if (weight[g] == 0) continue;
+      variance.array() +=
+          weight[g] * (left.variance.col(g) + (left.error.col(g) - error.array()).square());
+    }
+    const double run = weight.dot(run_of), specimen = weight.dot(specimen_of);
+    const double freedom = weight.dot(freedom_of);
     double square = 0;
     for (const Index i : relevant) square += error[i] * error[i] / variance[i];
     square /= static_cast<double>(relevant.size());
@@ -332,36 +372,81 @@ void ResponseEmulator::CompareWithRepeats(const Eigen::MatrixXd& inputs,
           .Tail(quality_.over_repeats);
 }
 
+ResponseEmulator::Parts ResponseEmulator::PredictParts(const Eigen::MatrixXd& standard) const {
+  Parts parts;
+  for (std::size_t g = 0; g < polynomials_.size(); ++g) {
+    parts.polynomials.emplace_back();
+    if (weights_.col(static_cast<Index>(g)).maxCoeff() > 0)
+      parts.polynomials.back() = polynomials_[g].Predict(PointsAt(standard));
+  }
+  for (Index k = 0; k < coordinates(); ++k) {
+    parts.processes.emplace_back();
+    if (weights_(k, weights_.cols() - 1) > 0)
+      parts.processes.back() = processes_[static_cast<std::size_t>(k)]->Predict(standard);
+  }
+  return parts;
+}
+
+Eigen::MatrixXd ResponseEmulator::MeansOf(const Parts& parts, Index k, Index points) const {
+  const auto degrees = static_cast<Index>(polynomials_.size());
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(points, degrees + 1);
+  for (Index g = 0; g < degrees; ++g) {
+    if (weights_(k, g) > 0)
+      result.col(g) = parts.polynomials[static_cast<std::size_t>(g)]->mean.col(k);
+  }
+  if (weights_(k, degrees) > 0)
+    result.col(degrees) = parts.processes[static_cast<std::size_t>(k)]->mean;
+  return result;
+}
+
 EmulatorPrediction ResponseEmulator::Predict(const Eigen::MatrixXd& standard) const {
-  const Index m = standard.rows(), q = coordinates();
+  const Index m = standard.rows(), q = coordinates(), degrees = weights_.cols() - 1;
   EmulatorPrediction result{.mean = Eigen::MatrixXd(m, q),
-                            .variance = Eigen::MatrixXd(m, q),
+                            .variance = Eigen::MatrixXd::Zero(m, q),
                             .added_run_variance = Eigen::VectorXd::Zero(m)};
-  std::vector<std::optional<EmulatorPrediction>> of_degree(polynomials_.size());
+  const Parts parts = PredictParts(standard);
   for (Index k = 0; k < q; ++k) {
-    const int degree = degree_[static_cast<std::size_t>(k)];
-    if (degree < 0) {
-      const GaussianProcessPrediction at =
-          processes_[static_cast<std::size_t>(k)]->Predict(standard);
-      result.mean.col(k) = at.mean;
-      result.variance.col(k) = widening_[k] * at.variance;
-      continue;
+    const Eigen::MatrixXd means = MeansOf(parts, k, m);
+    result.mean.col(k) = means * weights_.row(k).transpose();
+    auto variance = result.variance.col(k);
+    for (Index g = 0; g <= degrees; ++g) {
+      if (weights_(k, g) == 0) continue;
+      const Eigen::VectorXd own =
+          g < degrees
+              ? Eigen::VectorXd(parts.polynomials[static_cast<std::size_t>(g)]->variance.col(k))
+              : parts.processes[static_cast<std::size_t>(k)]->variance;
+      variance += weights_(k, g) * (own + (means.col(g) - result.mean.col(k)).cwiseAbs2());
     }
-    auto& at = of_degree[static_cast<std::size_t>(degree)];
-    if (!at) at = polynomials_[static_cast<std::size_t>(degree)].Predict(PointsAt(standard));
-    result.mean.col(k) = at->mean.col(k);
-    result.variance.col(k) = widening_[k] * at->variance.col(k);
+    variance *= widening_[k];
   }
   return result;
 }
 
-Eigen::MatrixXd ResponseEmulator::Covariance(Index k, const Eigen::MatrixXd& a,
-                                             const Eigen::MatrixXd& b) const {
-  const int degree = degree_[static_cast<std::size_t>(k)];
-  if (degree < 0) return widening_[k] * processes_[static_cast<std::size_t>(k)]->Covariance(a, b);
-  const FeatureEmulator& polynomial = polynomials_[static_cast<std::size_t>(degree)];
-  return widening_[k] * polynomial.Factor(PointsAt(a)) * polynomial.shrink().col(k).asDiagonal() *
-         polynomial.Factor(PointsAt(b)).transpose();
+std::vector<Eigen::MatrixXd> ResponseEmulator::Covariances(const Eigen::MatrixXd& a,
+                                                           const Eigen::MatrixXd& b) const {
+  const Index degrees = weights_.cols() - 1;
+  const Parts of_a = PredictParts(a), of_b = PredictParts(b);
+  std::vector<Eigen::MatrixXd> result;
+  for (Index k = 0; k < coordinates(); ++k) {
+    const Eigen::VectorXd weight = weights_.row(k).transpose();
+    const auto departures = [&](const Parts& parts, Index points) {
+      const Eigen::MatrixXd means = MeansOf(parts, k, points);
+      return Eigen::MatrixXd(means.colwise() - means * weight);
+    };
+    Eigen::MatrixXd covariance =
+        departures(of_a, a.rows()) * weight.asDiagonal() * departures(of_b, b.rows()).transpose();
+    for (Index g = 0; g < degrees; ++g) {
+      if (weight[g] == 0) continue;
+      const FeatureEmulator& polynomial = polynomials_[static_cast<std::size_t>(g)];
+      covariance += weight[g] * polynomial.Factor(PointsAt(a)) *
+                    polynomial.shrink().col(k).asDiagonal() *
+                    polynomial.Factor(PointsAt(b)).transpose();
+    }
+    if (weight[degrees] > 0)
+      covariance += weight[degrees] * processes_[static_cast<std::size_t>(k)]->Covariance(a, b);
+    result.push_back(widening_[k] * covariance);
+  }
+  return result;
 }
 
 }  // namespace calib::inference

@@ -1,6 +1,6 @@
 #pragma once
-// Emulator of the runs of one model: each coordinate by a polynomial or by a Gaussian process,
-// whichever predicts runs better that it has not seen.
+// Emulator of the runs of one model: each coordinate by polynomials and a Gaussian process, which
+// weigh as they predict runs that they have not seen.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -35,12 +35,15 @@ struct ResponseQuality {
 };
 
 /// Coordinates are turned and scaled such that noise and scatter are diagonal there and their sum
-/// is one (the scatter as a first polynomial leaves it, shrunk). In each of these either a
-/// FeatureEmulator of degree 0 to 4 stands for the model or a GaussianProcess, both with a
-/// departure of each packing; chosen by the log density of relevant runs left out. Variances are
-/// widened by the mean square standardised error of these where it exceeds one. Early ends are
-/// completed by draws given the coordinates they came to (CompletedRuns). Inputs are standardised
-/// coordinates of the prior. Immutable; thread safety: const.
+/// is one (the scatter as a first polynomial leaves it, shrunk). In each of these FeatureEmulators
+/// of degree 0 to 4 and a GaussianProcess stand for the model, all with a departure of each
+/// packing, as one normal law of the moments of their mixture: what they differ by is not known.
+/// They weigh by the log density of relevant runs left out, whose sum over other such runs is as
+/// uncertain as the Bayesian bootstrap says (pseudo-BMA+, Yao et al. 2018, Bayesian Anal. 13,
+/// sec. 3.4); of two that predict alike neither wins by a run. Variances are widened by the mean
+/// square standardised error of these runs where it exceeds one. Early ends are completed by draws
+/// given the coordinates they came to (CompletedRuns). Inputs are standardised coordinates of the
+/// prior. Immutable; thread safety: const.
 class ResponseEmulator {
  public:
   /// Deterministic in seed. in: what Validate accepts. Errors: FAILED_PRECONDITION for fewer
@@ -66,15 +69,23 @@ class ResponseEmulator {
 
   /// At m standardised points; the variance is that of the mean over packings.
   EmulatorPrediction Predict(const Eigen::MatrixXd& standard) const;
-  /// Covariances of what is not known of coordinate k at the rows of a with the same at b.
-  Eigen::MatrixXd Covariance(Eigen::Index k, const Eigen::MatrixXd& a,
-                             const Eigen::MatrixXd& b) const;
-  /// Degree of the polynomial of each coordinate; -1: a Gaussian process.
-  const std::vector<int>& degree() const { return degree_; }
+  /// Of each coordinate covariances of what is not known at the rows of a with the same at b.
+  std::vector<Eigen::MatrixXd> Covariances(const Eigen::MatrixXd& a,
+                                           const Eigen::MatrixXd& b) const;
+  /// q x m: of each coordinate the weights of polynomials by degree, and of a process at the end.
+  const Eigen::MatrixXd& weights() const { return weights_; }
 
  private:
-  void Choose(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
-              const std::vector<int>& packing);
+  /// What the polynomials and the processes that count predict.
+  struct Parts {
+    std::vector<std::optional<EmulatorPrediction>> polynomials;       // by degree
+    std::vector<std::optional<GaussianProcessPrediction>> processes;  // by coordinate
+  };
+  Parts PredictParts(const Eigen::MatrixXd& standard) const;
+  /// m x (degrees + 1): means of the parts of coordinate k; zeros for those of no weight.
+  Eigen::MatrixXd MeansOf(const Parts& parts, Eigen::Index k, Eigen::Index points) const;
+  void Weigh(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
+             const std::vector<int>& packing);
   void CompareWithRepeats(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs);
 
   Eigen::RowVectorXd mean_;  // q
@@ -85,7 +96,7 @@ class ResponseEmulator {
   double scatter_freedom_ = 0;
   std::vector<FeatureEmulator> polynomials_;  // by degree
   std::vector<std::optional<GaussianProcess>> processes_;
-  std::vector<int> degree_;
+  Eigen::MatrixXd weights_;   // q x (degrees + 1)
   Eigen::VectorXd widening_;  // q
   ResponseQuality quality_;
 };

@@ -102,6 +102,7 @@ std::string ToText(const Memory& memory) {
               {"mean", planning::VectorToJson(memory.of_decision.mean)},
               {"sd", planning::VectorToJson(memory.of_decision.sd)},
               {"batches", memory.of_decision.batches},
+              {"uncertain", memory.of_decision.uncertain},
               {"missing", memory.of_decision.missing},
               {"expected_gain", memory.expected_gain}}
       .dump();
@@ -115,7 +116,7 @@ absl::StatusOr<Memory> FromText(const std::string& text, int number) {
     if (!stage) return absl::DataLossError("a stored batch is of a stage that nobody knows");
     return Memory{
         {*stage, planning::VectorFromJson(json.at("mean")), planning::VectorFromJson(json.at("sd")),
-         json.value("batches", number), json.value("missing", 0)},
+         json.value("batches", number), json.value("uncertain", 0), json.value("missing", 0)},
         json.at("expected_gain").get<double>()};
   } catch (const Json::exception& error) {
     return absl::DataLossError(absl::StrCat("stored batch: ", error.what()));

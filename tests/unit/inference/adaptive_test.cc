@@ -416,6 +416,16 @@ TEST(AdaptiveDecision, EndsWhereTheModelMissesTheReadingsAndNoRunHelps) {
   EXPECT_EQ(near.decision.stage, AdaptiveStage::kConverged) << near.decision.reason;
 }
 
+TEST(AdaptiveDecision, EndsWhereItHasSettledAndNoRunWouldMakeItsMeansKnown) {
+  const AdaptiveLoop vain =
+      Calibrate(OffTheModel(0), {.max_runs = 150, .mean_error = 0.02, .seed = 3});
+  EXPECT_EQ(vain.decision.stage, AdaptiveStage::kNotConverged);
+  EXPECT_LT(vain.runs.rows(), 100);
+  EXPECT_TRUE(vain.decision.verification.passed);
+  EXPECT_THAT(vain.decision.reason, HasSubstr("not all means would be known to 0.02 sd"));
+  EXPECT_TRUE(vain.decision.posterior);
+}
+
 TEST(AdaptiveDecision, RefusesWhatDoesNotFit) {
   const AdaptiveToy toy = Bent(11);
   AdaptiveRuns runs = Filled(toy, 20);

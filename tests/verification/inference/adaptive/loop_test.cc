@@ -1,5 +1,5 @@
 // Adaptive calibrations of simulators whose posterior is known by brute force. How many seeds:
-// $CALIB_SEEDS, from $CALIB_FIRST_SEED on.
+// $CALIB_SEEDS, from $CALIB_FIRST_SEED on; at most $CALIB_RUNS_PER_PARAMETER runs of each.
 
 #include <gtest/gtest.h>
 
@@ -141,11 +141,12 @@ std::vector<Score> ScoresOf(const std::function<Case(std::uint64_t)>& make, int 
                             const std::string& name, int seeds, bool asynchronous = false) {
   std::vector<Score> scores;
   const int first = FromEnvironment("CALIB_FIRST_SEED", 1);
+  const int runs = FromEnvironment("CALIB_RUNS_PER_PARAMETER", 25) * d;
   for (int seed = first; seed < first + seeds; ++seed) {
     const Case one = make(static_cast<std::uint64_t>(seed));
     const AdaptiveLoop loop =
-        Calibrate(one.toy, {.max_runs = 25 * d, .seed = static_cast<std::uint64_t>(1000 + seed)},
-                  {}, asynchronous);
+        Calibrate(one.toy, {.max_runs = runs, .seed = static_cast<std::uint64_t>(1000 + seed)}, {},
+                  asynchronous);
     Score score{.runs = loop.runs.rows(), .stage = loop.decision.stage};
     if (loop.decision.posterior) {
       const AdaptivePosterior& p = *loop.decision.posterior;
@@ -193,7 +194,10 @@ std::vector<Score> ScoresOf(const std::function<Case(std::uint64_t)>& make, int 
     }
     return std::sqrt(sum / count);
   };
-  std::cout << name << ": root mean square error in standard errors as stated: means "
+  Index runs_in_all = 0;
+  for (const Score& score : scores) runs_in_all += score.runs;
+  std::cout << name << ": " << static_cast<double>(runs_in_all) / seeds << " runs on average\n"
+            << name << ": root mean square error in standard errors as stated: means "
             << root_mean_square([](const Score& s) { return s.of_means; }) << ", widths "
             << root_mean_square([](const Score& s) { return s.of_widths; }) << ", evidence "
             << root_mean_square([](const Score& s) { return VectorXd::Constant(1, s.of_evidence); })
