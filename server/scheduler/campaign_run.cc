@@ -142,11 +142,12 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     }
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
   }
-  if (everything) {
-    return AddStates(reader.States(id_));
+  if (everything) {  // what ended in earlier iterations is asked by plans alone
+    if (arrived_.empty()) return absl::OkStatus();
+    return AddStates(reader, arrived_.begin()->first, arrived_.rbegin()->first);
   }
   for (const int sample : of_samples) {
-    RETURN_IF_ERROR(AddStates(reader.States(id_, sample)));
+    RETURN_IF_ERROR(AddStates(reader, sample, sample));
   }
   return absl::OkStatus();
 }
@@ -156,7 +157,7 @@ absl::Status CampaignRun::Refresh(store::Reader& reader, const std::vector<Evalu
   std::set<int> samples;
   for (const EvaluationKey& key : keys) samples.insert(key.sample);
   for (const int sample : samples) {
-    RETURN_IF_ERROR(AddStates(reader.States(id_, sample)));
+    RETURN_IF_ERROR(AddStates(reader, sample, sample));
   }
   const std::set<EvaluationKey> wanted(keys.begin(), keys.end());
   for (const store::EvaluationRecord& evaluation : evaluations) {
@@ -167,14 +168,21 @@ absl::Status CampaignRun::Refresh(store::Reader& reader, const std::vector<Evalu
   return absl::OkStatus();
 }
 
-absl::Status CampaignRun::AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states) {
-  if (!states.ok()) {
-    return states.status();
-  }
-  for (const store::StateRecord& stored : *states) {
-    AddState(stored.key, stored.load_step, stored.observables);
-  }
-  return absl::OkStatus();
+absl::Status CampaignRun::AddStates(store::Reader& reader, int first, int last) {
+  EvaluationKey of;  // those of one evaluation come one after the other
+  Evaluation* evaluation = nullptr;
+  Arrived* arrived = nullptr;
+  return reader.EachState(
+      id_, first, last,
+      [&](const EvaluationKey& key, int load_step, std::span<const double> observables) {
+        if (evaluation == nullptr || key != of) {
+          of = key;
+          evaluation = &evaluations_[key];
+          const auto found = arrived_.find(key.sample);
+          arrived = found == arrived_.end() ? nullptr : &found->second;
+        }
+        AddState(key, load_step, observables, *evaluation, arrived);
+      });
 }
 
 absl::Status CampaignRun::Apply(planning::CampaignEvent event, const std::string& reason) {
@@ -377,14 +385,22 @@ bool CampaignRun::IsOfRunningIteration(int sample) const {
 
 void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
+  const auto arrived = arrived_.find(key.sample);
+  AddState(key, load_step, observables, evaluations_[key],
+           arrived == arrived_.end() ? nullptr : &arrived->second);
+}
+
+void CampaignRun::AddState(const EvaluationKey& key, int load_step,
+                           std::span<const double> observables, Evaluation& evaluation,
+                           Arrived* arrived) {
   if (observables.empty()) return;  // what a program told besides
   ++changes_;
   const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
   if (const auto position = positions.find(load_step); position != positions.end()) {
-    evaluations_[key].missing.Erase(position->second);
+    evaluation.missing.Erase(position->second);
   }
-  if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
-    definition_->readings.Place(key.experiment, load_step, observables, found->second.predictions);
+  if (arrived != nullptr) {
+    definition_->readings.Place(key.experiment, load_step, observables, arrived->predictions);
   }
 }
 

@@ -184,7 +184,10 @@ class CampaignRun {
     bool out = false;                ///< diverged or stopped
   };
   using ArrivedBySample = std::map<int, Arrived>;
-  absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
+  /// Of the samples from `first` to `last`.
+  absl::Status AddStates(store::Reader& reader, int first, int last);
+  void AddState(const store::EvaluationKey& key, int load_step, std::span<const double> observables,
+                Evaluation& evaluation, Arrived* arrived);
   bool IsOfRunningIteration(int sample) const;
   bool IsCalibrated(int experiment) const;
   /// Those that have not ended.

@@ -217,7 +217,9 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
       return *std::move(kept);
     }
   }
-  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
+  ASSIGN_OR_RETURN(
+      const auto evaluations,
+      reader.Evaluations(campaign, record.progress.iteration * record.submitted.samples));
   ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
   v1::CampaignStatus status = StatusWithout(record, concluded.problem);

@@ -84,7 +84,8 @@ absl::Status ToStatus(const SQLite::Exception& error, int system_errno) {
 
 Connection::Connection(const std::string& path, bool writable, Bare /*not set up*/)
     : database_(writable ? Closed(path) : path,
-                writable ? SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE : SQLite::OPEN_READONLY,
+                (writable ? SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE : SQLite::OPEN_READONLY) |
+                    SQLite::OPEN_NOMUTEX,  // one thread at a time
                 kBusyTimeoutMs),
       writable_(writable) {}
 
@@ -134,11 +135,16 @@ SQLite::Statement& Connection::Prepare(std::string_view sql) {
   return *known->second;
 }
 
-std::vector<double> ToDoubles(const SQLite::Column& column) {
-  std::vector<double> values(static_cast<std::size_t>(column.getBytes()) / sizeof(double));
+void ToDoubles(const SQLite::Column& column, std::vector<double>& values) {
+  values.resize(static_cast<std::size_t>(column.getBytes()) / sizeof(double));
   if (!values.empty()) {
     std::memcpy(values.data(), column.getBlob(), values.size() * sizeof(double));
   }
+}
+
+std::vector<double> ToDoubles(const SQLite::Column& column) {
+  std::vector<double> values;
+  ToDoubles(column, values);
   return values;
 }
 

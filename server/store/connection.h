@@ -93,5 +93,6 @@ class Connection {
 
 /// The doubles of a DoubleBlob, bit for bit.
 std::vector<double> ToDoubles(const SQLite::Column& column);
+void ToDoubles(const SQLite::Column& column, std::vector<double>& values);
 
 }  // namespace calib::store

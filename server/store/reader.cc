@@ -291,13 +291,15 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign,
   });
 }
 
-absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t campaign) {
+absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t campaign,
+                                                                  int first) {
   return Guard([&] {
     std::vector<EvaluationRecord> records;
     SQLite::Statement& row = connection_->Bind(
         "SELECT sample, experiment, status, reason, failures, digest, reused, rest_after, held_in, "
-        "aside, losses FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
-        campaign);
+        "aside, losses FROM evaluation WHERE campaign = ? AND sample >= ? "
+        "ORDER BY sample, experiment",
+        campaign, first);
     while (row.executeStep()) {
       records.push_back(
           {.key = {.campaign = campaign,
@@ -330,6 +332,27 @@ absl::StatusOr<std::vector<StateRecord>> Reader::States(std::int64_t campaign,
                         "WHERE campaign = ? AND sample = ? ORDER BY sample, experiment, load_step",
                         campaign, *sample));
   });
+}
+
+absl::Status Reader::EachState(
+    std::int64_t campaign, int first, int last,
+    const std::function<void(const EvaluationKey&, int, std::span<const double>)>& see) {
+  return Guard([&] {
+           SQLite::Statement& row = connection_->Bind(
+               "SELECT sample, experiment, load_step, observables FROM state WHERE campaign = ? "
+               "AND sample BETWEEN ? AND ? ORDER BY sample, experiment, load_step",
+               campaign, first, last);
+           std::vector<double> observables;
+           while (row.executeStep()) {
+             ToDoubles(row.getColumn(3), observables);
+             see({.campaign = campaign,
+                  .sample = row.getColumn(0).getInt(),
+                  .experiment = row.getColumn(1).getInt()},
+                 row.getColumn(2).getInt(), observables);
+           }
+           return true;
+         })
+      .status();
 }
 
 absl::StatusOr<std::vector<StateRecord>> Reader::StatesFrom(std::int64_t campaign, int first) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,10 +55,16 @@ class Reader {
   absl::StatusOr<std::vector<IterationRecord>> Iterations(std::int64_t campaign);
   /// The samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign, int first = 0);
-  absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign);
+  /// Those of the samples with the number `first` or a larger one.
+  absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign, int first = 0);
   /// The states of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);
+  /// Shows the states of the samples from `first` to `last` in their order and keeps none of them:
+  /// ten millions are read so within seconds. The observables are there during the call.
+  absl::Status EachState(std::int64_t campaign, int first, int last,
+                         const std::function<void(const EvaluationKey& key, int load_step,
+                                                  std::span<const double> observables)>& see);
   /// The states of the samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<StateRecord>> StatesFrom(std::int64_t campaign, int first);
   /// Of a campaign that was pruned: whether the states of this sample stay.
