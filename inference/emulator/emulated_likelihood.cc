@@ -115,8 +115,11 @@ void EmulatedLikelihood::Form::Sum() {
   const Eigen::VectorXd plain = whitener.solve(residual);
   for (const auto& errors : larger.colwise()) {
     const Eigen::VectorXd inverse = errors.cwiseInverse();
-    const Eigen::MatrixXd own_basis = whitener * (inverse.asDiagonal() * basis).eval();
-    const Eigen::VectorXd own_residual = whitener * inverse.cwiseProduct(plain).eval();
+    Eigen::MatrixXd own_basis = inverse.asDiagonal() * basis;
+    Eigen::VectorXd own_residual = inverse.cwiseProduct(plain);
+    // Of a group without readings yet; Eigen's triangular product reads the first number even then.
+    if (own_basis.size() > 0) own_basis = (whitener * own_basis).eval();
+    if (own_residual.size() > 0) own_residual = (whitener * own_residual).eval();
     at_level.push_back({.gram = own_basis.transpose() * own_basis,
                         .projection = own_basis.transpose() * own_residual,
                         .square = own_residual.squaredNorm(),
