@@ -145,10 +145,16 @@ Miss MissOf(const ResponseEmulator& emulator, const AdaptivePosterior& posterior
                         .Tail(least / freedom)};
 }
 
-// Whether a mean stays uncertain up to max_runs, its error falling with the root of the runs.
+// All runs that there may be, given ones too.
+Index MostRuns(const AdaptiveOptions& options) {
+  return options.max_runs + options.given.parameters.rows();
+}
+
+// Whether a mean stays uncertain up to the last of them, its error falling with their root.
 bool StaysUncertain(const AdaptivePosterior& posterior, Index runs,
                     const AdaptiveOptions& options) {
-  const double falls = std::sqrt(static_cast<double>(runs) / options.max_runs);
+  const double falls =
+      std::sqrt(static_cast<double>(runs) / static_cast<double>(MostRuns(options)));
   return (posterior.mean_error.array() / posterior.sd.array().max(1e-300)).maxCoeff() * falls >
          options.mean_error;
 }
@@ -274,8 +280,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
 
   const auto complete =
       static_cast<Index>(std::count(runs.end.begin(), runs.end.end(), RunEnd::kComplete));
-  const auto left =
-      static_cast<int>(options.max_runs + options.given.parameters.rows() - all.rows());
+  const auto left = static_cast<int>(MostRuns(options) - all.rows());
   if (complete < ResponseEmulator::LeastRuns(d)) {
     const std::string found =
         complete == 0 ? absl::StrCat("None of ", runs.rows(), " runs is complete")
@@ -347,7 +352,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
             "and what the emulator does not know together (chance %.0e), and up to %d runs "
             "no posterior would come of it. Where it fails and which effect it lacks are the "
             "questions before that of its parameters.",
-            runs.rows(), miss.rms, miss.chance, options.max_runs));
+            runs.rows(), miss.rms, miss.chance, MostRuns(options)));
   }
   if (result.verification.passed && settled && for_nothing) {
     result.posterior = std::move(posterior);
@@ -356,7 +361,7 @@ absl::StatusOr<AdaptiveDecision> DecideAdaptive(const AdaptiveProblem& problem,
         absl::StrFormat("Ended after %d runs: the posterior has settled and fresh runs of it "
                         "were predicted, but up to %d runs not all means would be known to "
                         "%.2f sd. That error is in the intervals.%s",
-                        runs.rows(), options.max_runs, options.mean_error, uncertain));
+                        runs.rows(), MostRuns(options), options.mean_error, uncertain));
   }
   if (ends) {
     result.posterior = std::move(posterior);
