@@ -129,7 +129,7 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
     return kCompleted;
   }
   errors << finished.reason() << '\n';
-  return finished.outcome() == v1::Finished::OUTCOME_DIVERGED ? kDiverged : kBadSpec;
+  return finished.outcome() == v1::Finished::OUTCOME_DIVERGED ? kModelDiverged : kBadSpec;
 }
 
 }  // namespace calib::worker

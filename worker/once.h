@@ -22,9 +22,9 @@ struct OnceOptions {
   std::string checkpoint{};
 };
 
-inline constexpr int kCompleted = 0;  ///< exit code: all load steps, or load_step, were reached
-inline constexpr int kDiverged = 1;   ///< exit code: the model cannot do it
-inline constexpr int kBadSpec = 2;    ///< exit code: the spec is unusable, or the run failed
+inline constexpr int kCompleted = 0;      ///< exit code: all load steps, or load_step, were reached
+inline constexpr int kModelDiverged = 1;  ///< exit code: the model cannot do it
+inline constexpr int kBadSpec = 2;        ///< exit code: the spec is unusable, or the run failed
 inline constexpr int kRefusedCheckpoint = 3;  ///< exit code: the checkpoint is of another run
 
 /// Writes `load_step,<observables>` and a row per state as soon as it is reached (17 significant

@@ -79,7 +79,7 @@ int RunProgramOnce(const ProgramOnceOptions& options, std::ostream& errors) {
   }
   if (finished.outcome() == v1::Finished::OUTCOME_COMPLETED) return kCompleted;
   errors << finished.reason() << '\n';
-  return finished.outcome() == v1::Finished::OUTCOME_DIVERGED ? kDiverged : kBadSpec;
+  return finished.outcome() == v1::Finished::OUTCOME_DIVERGED ? kModelDiverged : kBadSpec;
 }
 
 }  // namespace calib::worker

@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "fmt/format.h"
-#include "worker/program/request.h"
+#include "worker/program/json_text.h"
 
 namespace calib::worker {
 
