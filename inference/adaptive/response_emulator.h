@@ -72,7 +72,8 @@ class ResponseEmulator {
   /// Of each coordinate covariances of what is not known at the rows of a with the same at b.
   std::vector<Eigen::MatrixXd> Covariances(const Eigen::MatrixXd& a,
                                            const Eigen::MatrixXd& b) const;
-  /// q x m: of each coordinate the weights of polynomials by degree, and of a process at the end.
+  /// q x (degrees + 1): of each coordinate the weights of polynomials by degree, then of a process;
+  /// of sum one.
   const Eigen::MatrixXd& weights() const { return weights_; }
 
  private:

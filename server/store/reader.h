@@ -60,8 +60,8 @@ class Reader {
   /// The states of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);
-  /// Shows the states of the samples from `first` to `last` in their order and keeps none of them:
-  /// ten millions are read so within seconds. The observables are there during the call.
+  /// Shows the states of the samples from `first` to `last`, in the order of sample, experiment and
+  /// load step, and keeps none of them. The observables are there during the call alone.
   absl::Status EachState(std::int64_t campaign, int first, int last,
                          const std::function<void(const EvaluationKey& key, int load_step,
                                                   std::span<const double> observables)>& see);

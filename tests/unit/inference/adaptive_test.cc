@@ -173,6 +173,46 @@ TEST(ResponseEmulator, FollowsABentModelAndItsScatter) {
   EXPECT_GT(z.square().mean(), 0.1);
 }
 
+// A constant does not follow a straight line; what could bend more predicts it worse.
+TEST(ResponseEmulator, WeighsWhatPredictsRunsThatWereLeftOut) {
+  AdaptiveToy toy(
+      UnitSquare(),
+      [](const VectorXd& x) -> VectorXd {
+        return Eigen::Vector3d(10 * x[0], 8 * x[1], 5 * (x[0] + x[1]));
+      },
+      3, 5);
+  const auto emulator = ResponseEmulator::Fit(toy.problem(), Filled(toy, 60), 1);
+  ASSERT_TRUE(emulator.ok());
+  const Eigen::MatrixXd& weights = emulator->weights();
+  ASSERT_EQ(weights.rows(), 3);
+  EXPECT_GE(weights.minCoeff(), 0);
+  EXPECT_LT((weights.rowwise().sum().array() - 1).abs().maxCoeff(), 1e-12);
+  EXPECT_TRUE((weights.col(1).array() > weights.col(4).array()).all()) << weights;
+  EXPECT_EQ(weights.col(0).minCoeff(), 0) << weights;
+}
+
+// What parts differ by is in the variance, and in the covariance alike.
+TEST(ResponseEmulator, ItsCovariancesAreOfItsVariances) {
+  const AdaptiveToy toy = Bent(2);
+  const auto emulator = ResponseEmulator::Fit(toy.problem(), Filled(toy, 40), 1);
+  ASSERT_TRUE(emulator.ok());
+  int parts = 0;
+  for (const double weight : emulator->weights().reshaped()) parts += weight > 0.05 ? 1 : 0;
+  ASSERT_GT(parts, 3) << "one part each: " << emulator->weights();
+  const Eigen::MatrixXd at = StandardRows(toy.problem().prior, ScrambledSobol(20, 2, 5));
+  const Eigen::MatrixXd variance = emulator->Predict(at).variance;
+  const std::vector<Eigen::MatrixXd> all = emulator->Covariances(at, at);
+  const std::vector<Eigen::MatrixXd> head = emulator->Covariances(at.topRows(3), at);
+  ASSERT_EQ(all.size(), 3U);
+  for (Index k = 0; k < 3; ++k) {
+    const Eigen::MatrixXd& of = all[static_cast<std::size_t>(k)];
+    EXPECT_TRUE(of.diagonal().isApprox(variance.col(k), 1e-6)) << k;
+    EXPECT_TRUE(head[static_cast<std::size_t>(k)].isApprox(of.topRows(3), 1e-9)) << k;
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(of).eigenvalues().minCoeff(),
+              -1e-8 * of.trace());
+  }
+}
+
 TEST(ResponseEmulator, LearnsFromTheStagesThatEarlyEndsReached) {
   const AdaptiveToy toy = Bent(3);
   AdaptiveRuns runs = Filled(toy, 60);

@@ -165,6 +165,38 @@ TEST_F(StoreTest, DoublesSurviveBitForBit) {
   EXPECT_TRUE(std::isnan(samples->front().log_likelihood));
 }
 
+TEST_F(StoreTest, StatesAndEvaluationsOfSomeSamplesAlone) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.PutState({.key = kKey, .load_step = 0, .observables = {9}}, 0);
+    for (const int sample : {1, 2, 3}) {
+      const EvaluationKey key{.campaign = 1, .sample = sample, .experiment = 0};
+      t.InsertSample(1, {.sample = sample, .iteration = 0, .parameters = {1e9, 0.2}});
+      t.InsertEvaluation({.key = key, .digest = "d"});
+      for (const int step : {1, 0}) {
+        t.PutState({.key = key, .load_step = step, .observables = {0.5 + sample, 0.25 * step}}, 0);
+      }
+    }
+  });
+  Reader reader = Read();
+  std::vector<std::vector<double>> seen;
+  const auto see = [&](const EvaluationKey& key, int step, std::span<const double> observables) {
+    seen.push_back({static_cast<double>(key.campaign), static_cast<double>(key.sample),
+                    static_cast<double>(key.experiment), static_cast<double>(step)});
+    seen.back().insert(seen.back().end(), observables.begin(), observables.end());
+  };
+  ASSERT_TRUE(reader.EachState(1, 1, 2, see).ok());
+  const std::vector<std::vector<double>> expected = {
+      {1, 1, 0, 0, 1.5, 0}, {1, 1, 0, 1, 1.5, 0.25}, {1, 2, 0, 0, 2.5, 0}, {1, 2, 0, 1, 2.5, 0.25}};
+  EXPECT_EQ(seen, expected);
+  seen.clear();
+  ASSERT_TRUE(reader.EachState(2, 0, 9, see).ok());
+  EXPECT_TRUE(seen.empty());
+  ASSERT_EQ(reader.Evaluations(1)->size(), 4U);
+  ASSERT_EQ(reader.Evaluations(1, 2)->size(), 2U);
+  EXPECT_EQ(reader.Evaluations(1, 2)->front().key.sample, 2);
+}
+
 TEST_F(StoreTest, AStreamOfItsOwnComesBackAndNoneStaysNone) {
   Write([](Transaction& t) {
     PutEvaluation(t);

@@ -187,7 +187,7 @@ TEST_F(ProgramsTest, Limits) {
   EXPECT_THAT(
       reason("for k in 1 2 3 4; do head -c 400000 /dev/zero > $k; done; sleep 100",
              [](auto& limits) { limits.set_disk(1e6); }),
-      MatchesRegex("came to its disk limit: 1\\.[1-6][0-9]* MB of 1 MB, with 1 of 3 states"));
+      MatchesRegex("came to its disk limit: 1\\.[0-6][0-9]* MB of 1 MB, with 1 of 3 states"));
   EXPECT_THAT(
       reason("exec head -c 4000000 /dev/zero > big", [](auto& limits) { limits.set_disk(1e6); }),
       StartsWith("came to its disk limit: 1 MB of 1 MB"));
