@@ -35,13 +35,41 @@ absl::Status Scheduler::Load() {
   ticked_ = ports_.Now();
   last_attempt_ = last_attempt;
   last_campaign_ = last_campaign;
+  attempts_at_start_ = attempts;
   for (const store::CampaignRecord& record : campaigns) {
-    if (!IsOver(record.progress.state)) {
-      TakeUp(record.submitted.id,
-             CampaignRun::Load(*options_.methods, reader, record.submitted.id));
-    }
+    if (IsOver(record.progress.state)) continue;
+    started_with_.insert(record.submitted.id);
+    loading_.try_emplace(record.submitted.id);
   }
-  for (const store::ActiveAttempt& attempt : attempts) {
+  if (started_with_.empty()) {
+    TakeUpAll();
+    return absl::OkStatus();
+  }
+  for (const std::int64_t campaign : std::set<std::int64_t>(started_with_)) {
+    ports_.Load([this, campaign]() -> std::function<void()> {
+      if (stops_reading_) return [] {};
+      auto loaded = ReadCampaign(campaign);
+      return [this, campaign, loaded] {
+        read_.emplace(campaign, std::move(*loaded));
+        if (being_read() == 0) TakeUpAll();
+      };
+    });
+  }
+  return absl::OkStatus();
+}
+
+std::shared_ptr<absl::StatusOr<std::unique_ptr<CampaignRun>>> Scheduler::ReadCampaign(
+    std::int64_t campaign) {
+  auto reader = ports_.Read();
+  return std::make_shared<absl::StatusOr<std::unique_ptr<CampaignRun>>>(
+      reader.ok() ? CampaignRun::Load(*options_.methods, *reader, campaign) : reader.status());
+}
+
+void Scheduler::TakeUpAll() {
+  started_with_.clear();
+  auto read = std::exchange(read_, {});
+  for (auto& [campaign, loaded] : read) TakeUp(campaign, std::move(loaded));
+  for (const store::ActiveAttempt& attempt : std::exchange(attempts_at_start_, {})) {
     CampaignRun* run = FindRun(attempt.key.campaign);
     const LeaseEntry lease{.attempt = attempt.id,
                            .key = attempt.key,
@@ -56,14 +84,24 @@ absl::Status Scheduler::Load() {
       Hold(lease);
     }
   }
-  for (auto& [id, run] : runs_) {
+  for (const auto& [campaign, loaded] : read) {
+    CampaignRun* run = FindRun(campaign);
+    if (run == nullptr) continue;
     ReturnUnleased(*run);  // given back by a server that could not read the campaign
     PauseIfOfOtherMechanics(*run);
     TakeFromOthers(*run);
     Enqueue(*run);
-    Advance(id);
+    Advance(campaign);
   }
-  return absl::OkStatus();
+  for (const auto& [campaign, loaded] : read) {
+    StateChanged(campaign);
+    DoneLoading(campaign);
+  }
+  for (const auto& [session, hello] : std::exchange(early_, {})) {
+    if (const absl::Status admitted = Connected(session, hello); !admitted.ok()) {
+      ports_.Close(session, admitted);
+    }
+  }
 }
 
 store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
@@ -148,9 +186,7 @@ void Scheduler::TakeUpNow(std::int64_t campaign) {
 
 void Scheduler::LoadAside(std::int64_t campaign) {
   ports_.Load([this, campaign]() -> std::function<void()> {
-    auto reader = ports_.Read();
-    auto loaded = std::make_shared<absl::StatusOr<std::unique_ptr<CampaignRun>>>(
-        reader.ok() ? CampaignRun::Load(*options_.methods, *reader, campaign) : reader.status());
+    auto loaded = ReadCampaign(campaign);
     return [this, campaign, loaded] {
       TakeUp(campaign, std::move(*loaded));
       if (CampaignRun* run = FindRun(campaign); run != nullptr) {

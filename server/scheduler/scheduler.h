@@ -2,6 +2,7 @@
 // The heart of the service: which worker runs what, what its messages mean, and what a campaign
 // does next.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -66,9 +67,14 @@ class Scheduler {
   Scheduler(Ports& ports, SchedulerOptions options)
       : ports_(ports), options_(options), leases_(options.lease) {}
 
-  /// Takes up every campaign that is not over. Attempts that were running get a fresh lease: their
-  /// workers may come back and go on.
+  /// Begins to read every campaign that is not over, aside. When all are read, attempts that were
+  /// running get a fresh lease: their workers may come back and go on. Workers that come before
+  /// that are let in then, and so long what is wished of such a campaign waits.
   absl::Status Load();
+  /// What Load() has begun is left, since the process ends. On any thread.
+  void StopReading() { stops_reading_ = true; }
+  /// Campaigns that were there at the start and are still being read.
+  std::size_t being_read() const { return started_with_.size() - read_.size(); }
 
   // ---- workers (scheduler_links.cc, scheduler_runs.cc) ----
   /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's, or it has
@@ -241,8 +247,12 @@ class Scheduler {
   void WriteGrowth(std::int64_t campaign, const planning::Growth& growth, const GrowthReply& reply);
 
   // Campaigns (scheduler.cc, scheduler_plans.cc)
+  /// What Load() has begun is read: campaigns and their leases are taken up, workers let in.
+  void TakeUpAll();
   /// RESOURCE_EXHAUSTED when as many campaigns are not over as the server takes.
   absl::Status WhyNoMore() const;
+  /// On any thread; shared, since what is posted is copied.
+  std::shared_ptr<absl::StatusOr<std::unique_ptr<CampaignRun>>> ReadCampaign(std::int64_t campaign);
   void TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<CampaignRun>> loaded);
   /// Forgets what other mechanics have begun, leases included; the job does so in the store.
   store::Store::Job BeginAnew(CampaignRun& run,
@@ -308,6 +318,11 @@ class Scheduler {
   std::set<std::int64_t> computing_;  // campaigns with a plan in the making
   std::set<std::int64_t> viewing_;    // and with a view in the making
   std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
+  std::atomic<bool> stops_reading_ = false;
+  std::set<std::int64_t> started_with_;  // campaigns of Load(), empty once TakeUpAll() was called
+  std::map<std::int64_t, absl::StatusOr<std::unique_ptr<CampaignRun>>> read_;  // of these so far
+  std::vector<store::ActiveAttempt> attempts_at_start_;                        // until then
+  std::map<std::int64_t, v1::Hello> early_;              // workers that wait for that, by session
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::string> unreadable_;       // why, of those that are not over
   std::map<std::int64_t, std::pair<double, int>>

@@ -88,6 +88,10 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
     worker.set_unix_ms(ports_.UnixMs());
     return admitted;
   }
+  if (!started_with_.empty()) {
+    early_[session] = hello;
+    return absl::OkStatus();
+  }
   const Clock::time_point now = ports_.Now();
   FitSlots(hello);
   if (const std::int64_t before = workers_.Connect(hello, session, leases_.Busy(hello.name()), now);
@@ -143,6 +147,7 @@ void Scheduler::FitSlots(const v1::Hello& hello) {
 }
 
 void Scheduler::Disconnected(std::int64_t session) {
+  early_.erase(session);
   // Its leases stay: the worker may only have lost the connection and go on computing.
   workers_.Disconnect(session);
   WorkersChanged();

@@ -90,6 +90,7 @@ absl::Status Core::Start() {
 
 void Core::BeginShutdown() {
   ends_ = true;
+  scheduler_.StopReading();
   Post([this] {
     if (health_.ok()) {
       health_ = absl::UnavailableError("the server is going down");
@@ -109,8 +110,20 @@ void Core::Post(std::function<void()> task) {
   boost::asio::post(threads_->strand,
                     [this, task = std::move(task), asked = std::chrono::steady_clock::now()] {
                       strand_lag_.Add(std::chrono::steady_clock::now() - asked);
-                      task();
+                      Turn(task);
                     });
+}
+
+void Core::Turn(const std::function<void()>& task) {
+  in_turn_ = true;
+  task();
+  in_turn_ = false;
+  if (!asked_.empty()) store_->Write(std::exchange(asked_, {}));
+}
+
+void Core::Ask(store::Store::Asked asked) {
+  asked_.push_back(std::move(asked));
+  if (!in_turn_) store_->Write(std::exchange(asked_, {}));
 }
 
 void Core::Query(std::function<void()> task) {
@@ -142,7 +155,7 @@ Tidying::Site Core::TidyingSite() {
                 threads_->pause.expires_after(pause);
                 threads_->pause.async_wait(
                     [this, task = std::move(task)](const boost::system::error_code& error) {
-                      if (!error && health_.ok()) task();
+                      if (!error && health_.ok()) Turn(task);
                     });
               },
           .unix_ms = [this] { return UnixMs(); }};
@@ -159,11 +172,11 @@ void Core::RemoveSession(std::int64_t session) {
 }
 
 void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->Write(std::move(job), TellsOf(std::move(then)));
+  Ask({.job = std::move(job), .done = TellsOf(std::move(then))});
 }
 
 void Core::WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then) {
-  store_->WriteIfRoom(std::move(job), TellsOf(std::move(then)));
+  Ask({.job = std::move(job), .done = TellsOf(std::move(then)), .waits_for_room = false});
 }
 
 store::Store::Done Core::TellsOf(std::function<void(const absl::Status&)> then) {
@@ -235,6 +248,7 @@ Measured Core::Measure() const {
       .store_waits = wait_.has_value(),
       .campaigns = scheduler_.live(),
       .queued = scheduler_.queued(),
+      .being_read = scheduler_.being_read(),
       .planning = scheduler_.planning(),
       .store = store_->Numbers(),
       .acknowledgements = acknowledgements_.Read(),
@@ -309,11 +323,13 @@ void Core::ScheduleTick() {
       options_.lease / 4, std::chrono::milliseconds(20), std::chrono::milliseconds(1000)));
   threads_->tick.async_wait([this](const boost::system::error_code& error) {
     if (!error && health_.ok()) {
-      scheduler_.Tick();
-      if (const auto now = std::chrono::steady_clock::now(); now - tidied_ > kTidiedAgain) {
-        tidied_ = now;
-        tidying_.Begin();
-      }
+      Turn([this] {
+        scheduler_.Tick();
+        if (const auto now = std::chrono::steady_clock::now(); now - tidied_ > kTidiedAgain) {
+          tidied_ = now;
+          tidying_.Begin();
+        }
+      });
       ScheduleTick();
     }
   });

@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "server/scheduler/ports.h"
 #include "server/scheduler/scheduler.h"
@@ -55,7 +56,8 @@ class Core final : public scheduler::Ports {
   /// destructor.
   void BeginShutdown();
 
-  /// Runs on the strand, in order.
+  /// Runs on the strand, in order. What a task asks to be written goes to the store at its end,
+  /// together: a run's end and the next lease are one commit.
   void Post(std::function<void()> task);
   /// Runs on the pool for what takes moments.
   void Query(std::function<void()> task);
@@ -108,6 +110,10 @@ class Core final : public scheduler::Ports {
 
  private:
   void Fail(const absl::Status& status);
+  /// On the strand: a task of it, then to the store what it has asked to be written.
+  void Turn(const std::function<void()>& task);
+  /// To the store, at the end of the Turn() that is running.
+  void Ask(store::Store::Asked asked);
   /// What the store has said of a write that was asked for at `asked`, on the strand.
   void Written(absl::Status status, std::chrono::steady_clock::time_point asked,
                const std::function<void(const absl::Status&)>& then);
@@ -144,6 +150,8 @@ class Core final : public scheduler::Ports {
   std::uint64_t changes_of_room_ = 0;
   const std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   store::Durations strand_lag_, acknowledgements_;
+  bool in_turn_ = false;
+  std::vector<store::Store::Asked> asked_;  // in it, to be written
   std::map<std::int64_t, Session*> sessions_;
   std::int64_t last_session_ = 0;
   std::thread thread_;

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <set>
+#include <string_view>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
@@ -32,95 +32,93 @@ bool RunsAreAdded(const campaign::Method* method) {
   return method != nullptr && method->chosen_by() == campaign::ChosenBy::kRequest;
 }
 
-struct SampleStatus {
-  EvaluationStatus worst = EvaluationStatus::kWaiting;
-  std::string reason{};
-  bool at_rung = false;  // stopped there, which it may not be for ever
-};
-
-/// Of one sample from its evaluations: what is worst about it, else how far it has come.
-SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) {
-  SampleStatus status;
-  std::size_t finished = 0;
-  bool begun = false;
-  for (const EvaluationRecord* evaluation : evaluations) {
-    switch (evaluation->status) {
+/// Of one sample from its evaluations, in the order of its experiments: the first that has ended
+/// without a result, else how far it has come.
+class SampleStatus {
+ public:
+  /// rests: it is to stop before its end.
+  void Add(EvaluationStatus status, bool rests, std::string_view reason = "") {
+    if (failed_.has_value()) return;
+    ++evaluations_;
+    switch (status) {
       case EvaluationStatus::kDiverged:
       case EvaluationStatus::kStoppedEarly:
       case EvaluationStatus::kFailed:
       case EvaluationStatus::kUnknown:
-        return {.worst = evaluation->status,
-                .reason = evaluation->reason,
-                .at_rung = evaluation->status == EvaluationStatus::kStoppedEarly &&
-                           evaluation->rest_after.has_value()};
+        failed_ = status;
+        reason_ = reason;
+        at_rung_ = status == EvaluationStatus::kStoppedEarly && rests;
+        break;
       case EvaluationStatus::kRunning:
-        begun = true;
+        begun_ = true;
         break;
       case EvaluationStatus::kFinished:
-        ++finished;
+        begun_ = true;
+        ++finished_;
         break;
       case EvaluationStatus::kWaiting:
         break;
     }
   }
-  if (finished == evaluations.size()) {
-    status.worst = EvaluationStatus::kFinished;
-  } else if (begun || finished > 0) {
-    status.worst = EvaluationStatus::kRunning;
+  EvaluationStatus worst() const {
+    if (failed_.has_value()) return *failed_;
+    if (finished_ == evaluations_) return EvaluationStatus::kFinished;
+    return begun_ ? EvaluationStatus::kRunning : EvaluationStatus::kWaiting;
   }
-  return status;
+  const std::string& reason() const { return reason_; }
+  /// Stopped there, which it may not be for ever.
+  bool at_rung() const { return at_rung_; }
+
+ private:
+  std::optional<EvaluationStatus> failed_;
+  std::string reason_;
+  bool at_rung_ = false;
+  bool begun_ = false;
+  int evaluations_ = 0;
+  int finished_ = 0;
+};
+
+/// open: what rests may yet go on, which is known when its iteration ends.
+void Count(const SampleStatus& sample, bool open, v1::CampaignStatus& status) {
+  const EvaluationStatus worst = sample.worst();
+  const bool diverged = worst == EvaluationStatus::kDiverged;
+  const bool unknown = worst == EvaluationStatus::kUnknown;
+  const bool resting = open && sample.at_rung();
+  const bool stopped = worst == EvaluationStatus::kStoppedEarly && !resting;
+  const bool running = worst == EvaluationStatus::kRunning;
+  const bool done = diverged || stopped || unknown || worst == EvaluationStatus::kFinished;
+  status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
+  status.set_samples_unknown(status.samples_unknown() + (unknown ? 1 : 0));
+  status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
+  status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
+  status.set_samples_running(status.samples_running() + (running ? 1 : 0));
+  status.set_samples_done(status.samples_done() + (done ? 1 : 0));
 }
 
-std::map<int, SampleStatus> StatusBySample(const std::vector<EvaluationRecord>& evaluations) {
-  std::map<int, std::vector<const EvaluationRecord*>> by_sample;
-  for (const EvaluationRecord& evaluation : evaluations) {
-    by_sample[evaluation.key.sample].push_back(&evaluation);
-  }
-  std::map<int, SampleStatus> statuses;
-  for (const auto& [sample, of_sample] : by_sample) {
-    statuses[sample] = Summarise(of_sample);
-  }
-  return statuses;
-}
-
-void CountSamples(const store::CampaignRecord& record,
-                  const std::vector<EvaluationRecord>& evaluations, v1::CampaignStatus& status) {
-  const int size = record.submitted.samples;
-  // Whether what rests goes on is known when its iteration ends.
+/// Counts the samples of the last iteration, or the rows of the last batch of a design; how many
+/// there are.
+absl::StatusOr<int> CountSamples(store::Reader& reader, const store::CampaignRecord& record,
+                                 v1::CampaignStatus& status) {
   const bool open = record.progress.phase == Phase::kCalibrating &&
                     (record.progress.state == CampaignState::kRunning ||
                      record.progress.state == CampaignState::kPaused);
-  for (const auto& [sample, sample_status] : StatusBySample(evaluations)) {
-    if (sample / size != record.progress.iteration) {
-      continue;
-    }
-    const bool diverged = sample_status.worst == EvaluationStatus::kDiverged;
-    const bool resting = open && sample_status.at_rung;
-    const bool stopped = sample_status.worst == EvaluationStatus::kStoppedEarly && !resting;
-    status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
-    const bool unknown = sample_status.worst == EvaluationStatus::kUnknown;
-    status.set_samples_unknown(status.samples_unknown() + (unknown ? 1 : 0));
-    status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
-    status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
-    status.set_samples_running(status.samples_running() +
-                               (sample_status.worst == EvaluationStatus::kRunning ? 1 : 0));
-    status.set_samples_done(
-        status.samples_done() +
-        (diverged || stopped || unknown || sample_status.worst == EvaluationStatus::kFinished ? 1
-                                                                                              : 0));
-  }
-}
-
-/// Samples of the last iteration, or rows of the last batch of a design.
-int SamplesOfLast(const store::CampaignRecord& record,
-                  const std::vector<EvaluationRecord>& evaluations) {
-  std::set<int> rows;
-  for (const EvaluationRecord& evaluation : evaluations) {
-    if (evaluation.key.sample / record.submitted.samples == record.progress.iteration) {
-      rows.insert(evaluation.key.sample);
-    }
-  }
-  return static_cast<int>(rows.size());
+  const int first = record.progress.iteration * record.submitted.samples;
+  int samples = 0;
+  int last = first - 1;
+  SampleStatus of_last;
+  RETURN_IF_ERROR(reader.EachStatus(record.submitted.id, first,
+                                    first + record.submitted.samples - 1,
+                                    [&](int sample, EvaluationStatus evaluation, bool rests) {
+                                      if (sample != last) {
+                                        if (samples > 0) Count(of_last, open, status);
+                                        ++samples;
+                                        last = sample;
+                                        of_last = {};
+                                      }
+                                      of_last.Add(evaluation, rests);
+                                    }));
+  if (samples > 0) Count(of_last, open, status);
+  return samples;
 }
 
 struct Concluded {
@@ -217,9 +215,6 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
       return *std::move(kept);
     }
   }
-  ASSIGN_OR_RETURN(
-      const auto evaluations,
-      reader.Evaluations(campaign, record.progress.iteration * record.submitted.samples));
   ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
   v1::CampaignStatus status = StatusWithout(record, concluded.problem);
@@ -229,16 +224,13 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
   const auto method = methods::All().Find(record.submitted.method);
+  ASSIGN_OR_RETURN(const int samples, CountSamples(reader, record, status));
   if (RunsAreAdded(method.get())) {  // what may be added nobody knows
     status.set_max_iterations(record.progress.iteration + 1);
-    status.set_samples(SamplesOfLast(record, evaluations));
+    status.set_samples(samples);
   }
   // The first iteration may have given runs besides.
-  if (method != nullptr && method->batches_vary()) {
-    if (const int samples = SamplesOfLast(record, evaluations); samples > 0)
-      status.set_samples(samples);
-  }
-  CountSamples(record, evaluations, status);
+  if (method != nullptr && method->batches_vary() && samples > 0) status.set_samples(samples);
   if (concluded.last.has_value()) {
     status.set_effective_sample_size(concluded.last->ess());
     status.set_best_misfit(concluded.best_misfit);
@@ -398,15 +390,19 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
       purposes[iteration.number] = planning::StageIn(iteration.proposal);
     }
   }
-  auto statuses = StatusBySample(evaluations);
+  std::map<int, SampleStatus> statuses;
+  for (const EvaluationRecord& evaluation : evaluations) {
+    statuses[evaluation.key.sample].Add(evaluation.status, evaluation.rest_after.has_value(),
+                                        evaluation.reason);
+  }
   std::vector<v1::Sample> messages;
   for (const store::SampleRecord& sample : samples) {
     v1::Sample& message = messages.emplace_back();
     message.set_index(sample.sample);
     message.set_iteration(sample.iteration);
     message.mutable_parameters()->Add(sample.parameters.begin(), sample.parameters.end());
-    message.set_status(ToString(statuses[sample.sample].worst));
-    message.set_reason(statuses[sample.sample].reason);
+    message.set_status(ToString(statuses[sample.sample].worst()));
+    message.set_reason(statuses[sample.sample].reason());
     message.set_weight(std::exp(sample.log_weight));
     message.set_log_likelihood(sample.log_likelihood);
     const auto made = attempts.find(sample.sample);

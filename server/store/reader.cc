@@ -320,6 +320,24 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
   });
 }
 
+absl::Status Reader::EachStatus(
+    std::int64_t campaign, int first, int last,
+    const std::function<void(int sample, EvaluationStatus status, bool rests)>& see) {
+  return Guard([&] {
+           SQLite::Statement& row = connection_->Bind(
+               "SELECT sample, status, aside, rest_after IS NOT NULL FROM evaluation "
+               "WHERE campaign = ? AND sample BETWEEN ? AND ? ORDER BY sample, experiment",
+               campaign, first, last);
+           while (row.executeStep()) {
+             see(row.getColumn(0).getInt(),
+                 ToEvaluationStatus(row.getColumn(1).getString(), row.getColumn(2).getInt() != 0),
+                 row.getColumn(3).getInt() != 0);
+           }
+           return true;
+         })
+      .status();
+}
+
 absl::StatusOr<std::vector<StateRecord>> Reader::States(std::int64_t campaign,
                                                         std::optional<int> sample) {
   if (!sample.has_value()) {

@@ -57,6 +57,11 @@ class Reader {
   absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign, int first = 0);
   /// Those of the samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign, int first = 0);
+  /// Shows how the evaluations of the samples from `first` to `last` are, in the order of sample
+  /// and experiment. rests: it is to stop before its end.
+  absl::Status EachStatus(
+      std::int64_t campaign, int first, int last,
+      const std::function<void(int sample, EvaluationStatus status, bool rests)>& see);
   /// The states of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);

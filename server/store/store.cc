@@ -52,9 +52,13 @@ class Store::Writer {
     absl::Status refused{};  ///< it is not written, for a reason of its own; the others are
   };
 
-  void Enqueue(Entry entry) {
+  void Enqueue(std::vector<Asked> together) {
     absl::MutexLock lock(&mutex_);
-    queue_.push_back(std::move(entry));
+    for (Asked& asked : together) {
+      queue_.push_back({.job = std::move(asked.job),
+                        .done = std::move(asked.done),
+                        .waits_for_room = asked.waits_for_room});
+    }
   }
   void Watch(OnRoom on_room) {
     absl::MutexLock lock(&mutex_);
@@ -304,12 +308,14 @@ Store::Store(std::string path, std::unique_ptr<Writer> writer)
 Store::~Store() = default;
 
 void Store::Write(Job job, Done done) {
-  writer_->Enqueue({.job = std::move(job), .done = std::move(done)});
+  writer_->Enqueue({{.job = std::move(job), .done = std::move(done)}});
 }
 
 void Store::WriteIfRoom(Job job, Done done) {
-  writer_->Enqueue({.job = std::move(job), .done = std::move(done), .waits_for_room = false});
+  writer_->Enqueue({{.job = std::move(job), .done = std::move(done), .waits_for_room = false}});
 }
+
+void Store::Write(std::vector<Asked> together) { writer_->Enqueue(std::move(together)); }
 
 void Store::Watch(OnRoom on_room) { writer_->Watch(std::move(on_room)); }
 

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "server/store/numbers.h"
@@ -53,6 +54,14 @@ class Store {
   /// again but gets RESOURCE_EXHAUSTED, within one pause between tries and before those that wait:
   /// neither waits for the other.
   void WriteIfRoom(Job job, Done done);
+  /// A write that is asked for with others.
+  struct Asked {
+    Job job;
+    Done done;
+    bool waits_for_room = true;  ///< as of Write(), else as of WriteIfRoom()
+  };
+  /// These in their order, in one commit where nothing hinders it.
+  void Write(std::vector<Asked> together);
   /// Write() that waits. Not to be called from a Job or Done.
   absl::Status WriteNow(Job job);
 

@@ -5,8 +5,10 @@ One small campaign is calibrated; finished ones are copies of its rows under oth
 
 import argparse
 import contextlib
+import http.client
 import json
 import pathlib
+import re
 import sqlite3
 import statistics
 import subprocess
@@ -28,13 +30,20 @@ class Server:
         told = self.state / "server.json"
         told.unlink(missing_ok=True)
         begun = time.monotonic()
-        self.process = subprocess.Popen([self.programs / "calibd", "--state", self.state, "--listen", "127.0.0.1:0", "--max-predictions", "1000000000"],
+        self.process = subprocess.Popen([self.programs / "calibd", "--state", self.state, "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0",
+                                         "--log-file", self.state / "log", "--max-predictions", "1000000000"],
                                         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         while self.process.poll() is None:
             if told.exists() and (address := json.loads(told.read_text() or "{}").get("address")):
                 self.address = address
                 if self.run("list", "--limit", "1", check=False).returncode == 0:
                     self.ready = time.monotonic() - begun
+                    page = next(line for line in self.process.stderr if line.startswith("page: "))
+                    self.page = http.client.HTTPConnection(re.search(r"//([^/]+)/", page)[1])
+                    self.token = {"Authorization": f"Bearer {(self.state / 'token').read_text().strip()}"}
+                    if not until(lambda: "\ncalib_campaigns_being_read 0\n" in self.get("/metrics"), 300):
+                        raise SystemExit("calibd does not read its campaigns")
+                    self.takes_work = time.monotonic() - begun
                     return self
             time.sleep(0.02)
         raise SystemExit(f"calibd ended: {self.process.stderr.read()}")
@@ -57,6 +66,23 @@ class Server:
             self.run(*words)
             took.append(1e3 * (time.monotonic() - begun))
         return f"{statistics.median(took):.0f}, {max(took):.0f} ms"
+
+    def get(self, target):
+        self.page.request("GET", target, headers=self.token)
+        answer = self.page.getresponse()
+        text = answer.read().decode()
+        if answer.status != 200:
+            raise SystemExit(f"{target}: {answer.status} {text}")
+        return text
+
+    def answered(self, targets):
+        """Median and longest of these questions over one connection, of which the page has kept no answer [ms]."""
+        took = []
+        for target in targets:
+            begun = time.monotonic()
+            self.get(target)
+            took.append(1e3 * (time.monotonic() - begun))
+        return f"{statistics.median(took):.1f}, {max(took):.1f} ms"
 
     def resident(self):
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
@@ -144,6 +170,10 @@ def main():
                 told = json.loads(server.run("submit", campaign(folder, "live.yaml", samples), "--seed", str(seed)).stdout)
                 if told["campaign"] != number:
                     raise SystemExit(f"submitted as {told}, not {number}")
+            with contextlib.closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True)) as db:
+                planned = "SELECT count(DISTINCT campaign) FROM sample WHERE campaign > ?"
+                if not until(lambda: db.execute(planned, (options.finished,)).fetchone()[0] == options.live, 300):
+                    raise SystemExit("the live campaigns are not planned")
         with contextlib.closing(sqlite3.connect(file)) as db:
             made = sum(give_states(db, int(number[1:])) for number in live)
             of_all = db.execute("SELECT count(*) FROM state").fetchone()[0]
@@ -152,7 +182,12 @@ def main():
               "| what | taken |\n|---|---|", flush=True)
         with Server(options.bin, state) as server:
             print(f"| ready, from the start of calibd to the first answer | {server.ready:.2f} s |")
+            print(f"| campaigns read and workers let in, from the start of calibd | {server.takes_work:.2f} s |")
             print(f"| resident then | {server.resident():.0f} MiB |")
+            pages = [f"/api/v1/campaigns?limit={limit}" for limit in range(100, 100 - TIMES, -1)]
+            print(f"| first page of `list` (92 to 100 campaigns) over an open connection: median, longest of {TIMES} | {server.answered(pages)} |")
+            shown = [f"/api/v1/campaigns/{number}" for number in live]
+            print(f"| `show` over an open connection, of each live campaign: median, longest of {len(shown)} | {server.answered(shown)} |")
             print(f"| `calibctl --version`, for comparison: median, longest of {TIMES} | {server.took('--version')} |")
             print(f"| `list --limit 100` | {server.took('list', '--limit', '100')} |")
             print(f"| `list`, all | {server.took('list')} |")

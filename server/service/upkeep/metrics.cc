@@ -69,6 +69,9 @@ std::string MetricsText(const Measured& m) {
   text.Gauge("uptime_seconds", "Since the server started.", m.seconds);
 
   text.Gauge("campaigns", "Campaigns that are not over.", m.campaigns);
+  text.Gauge("campaigns_being_read",
+             "Those that were there at the start and are still being read; workers wait for them.",
+             m.being_read);
   text.Gauge("campaigns_planning", "Those whose next iteration is being computed.", m.planning);
   text.Gauge("queue_evaluations", "Evaluations that wait for a slot.", m.queued);
   text.Begin("workers", "gauge", "Workers by state; a draining one is connected too.");

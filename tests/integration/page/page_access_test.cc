@@ -62,10 +62,11 @@ TEST_F(LivePageTest, MetricsAreOpenAndCountWhatTheServerDoes) {
   EXPECT_EQ(reply.headers.at("content-type"), "text/plain; version=0.0.4; charset=utf-8");
   EXPECT_THAT(reply.headers.at("content-security-policy"), HasSubstr("default-src 'none'"));
   for (const char* line :
-       {"calib_campaigns 0\n", "calib_queue_evaluations 0\n", "calib_store_waits 0\n",
-        "calib_lease_expiries_total 0\n", "calib_workers{state=\"connected\"} ",
-        "# TYPE calib_ack_seconds histogram\n", "calib_commit_seconds_bucket{le=\"+Inf\"} ",
-        "calib_strand_lag_seconds_count ", "calib_wal_bytes "}) {
+       {"calib_campaigns 0\n", "calib_campaigns_being_read 0\n", "calib_queue_evaluations 0\n",
+        "calib_store_waits 0\n", "calib_lease_expiries_total 0\n",
+        "calib_workers{state=\"connected\"} ", "# TYPE calib_ack_seconds histogram\n",
+        "calib_commit_seconds_bucket{le=\"+Inf\"} ", "calib_strand_lag_seconds_count ",
+        "calib_wal_bytes "}) {
     EXPECT_THAT(reply.body, HasSubstr(line));
   }
   EXPECT_THAT(reply.body, Not(HasSubstr("calib_runs_total{end=\"completed\"} 0\n")));

@@ -144,6 +144,51 @@ TEST(CampaignLife, WorkerKeepsItsAttemptAcrossARestartOfTheServer) {
   EXPECT_TRUE(service.Next(after, Kind::kAck).ack().finished());
 }
 
+TEST(CampaignLife, WhatComesWhileCampaignsAreReadWaitsForThem) {
+  SimulatedService service("early");
+  service.Submit(Small());
+  const std::int64_t before = service.Connect("w", 1);
+  const v1::Lease lease = service.Next(before, Kind::kLease).lease();
+  service.BeginRestart();
+  Scheduler& scheduler = service.scheduler();
+  EXPECT_EQ(scheduler.being_read(), 1U);
+  EXPECT_FALSE(scheduler.Live(1).has_value());
+  v1::Hello hello = testing::MatchingHello("w", 1);
+  hello.add_attempts(lease.attempt());
+  EXPECT_TRUE(scheduler.Connected(101, hello).ok());
+  EXPECT_TRUE(scheduler.Connected(102, testing::MatchingHello("gone", 1)).ok());
+  scheduler.Disconnected(102);
+  v1::Hello other = testing::MatchingHello("w", 1);  // another process of this name
+  other.set_instance("another");
+  EXPECT_TRUE(scheduler.Connected(103, other).ok());
+  absl::Status paused = absl::UnknownError("no answer");
+  scheduler.Pause(1, nullptr, [&paused](const absl::Status& status) { paused = status; });
+  EXPECT_TRUE(absl::IsUnknown(paused));
+  EXPECT_TRUE(scheduler.Workers().empty());
+  EXPECT_EQ(service.Next(101, Kind::kWelcome).message_case(), Kind::MESSAGE_NOT_SET);
+
+  service.ports().Run();
+  EXPECT_EQ(scheduler.being_read(), 0U);
+  EXPECT_TRUE(paused.ok()) << paused;
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kPaused);
+  EXPECT_TRUE(service.Next(101, Kind::kWelcome).has_welcome());
+  EXPECT_EQ(service.ports().closed, std::vector<std::int64_t>{103});
+  ASSERT_EQ(scheduler.Workers().size(), 1U);
+  EXPECT_EQ(scheduler.Workers().front().busy(), 1);
+  service.SendStates(101, lease, 0, 4);
+  EXPECT_EQ(service.Next(101, Kind::kAck).ack().up_to(), 4);
+}
+
+TEST(CampaignLife, AServerThatEndsReadsNoMoreCampaigns) {
+  SimulatedService service("ends");
+  service.Submit(Small());
+  service.BeginRestart();
+  service.scheduler().StopReading();
+  service.ports().Run();
+  EXPECT_EQ(service.scheduler().being_read(), 1U);
+  EXPECT_EQ(service.scheduler().live(), 0U);
+}
+
 // A server that cannot read a campaign gives back its attempts, and may end before it has read it.
 TEST(CampaignLife, WhatRunsByTheStoreAndByNoAttemptIsLeasedByTheNextServer) {
   SimulatedService service("unleased");

@@ -84,6 +84,11 @@ SimulatedService::SimulatedService(const std::string& name, const campaign::Meth
 }
 
 void SimulatedService::Restart() {
+  BeginRestart();
+  ports_->Run();
+}
+
+void SimulatedService::BeginRestart() {
   const auto now = ports_ == nullptr ? std::chrono::steady_clock::time_point{} : ports_->now;
   scheduler_.reset();
   ports_.reset();
@@ -100,7 +105,6 @@ void SimulatedService::Restart() {
                                 .methods = methods_});
   const absl::Status status = scheduler_->Load();
   EXPECT_TRUE(status.ok()) << status;
-  ports_->Run();
 }
 
 std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,

@@ -69,6 +69,8 @@ class SimulatedService {
 
   /// A new server process on the same file: memory is gone, streams are cut.
   void Restart();
+  /// The same, up to where it begins to read its campaigns.
+  void BeginRestart();
   /// Of a build that has these methods.
   void RestartWith(const campaign::MethodList& methods) {
     methods_ = &methods;

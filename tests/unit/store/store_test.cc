@@ -11,6 +11,7 @@
 #include <limits>
 #include <span>
 
+#include "absl/strings/str_cat.h"
 #include "absl/synchronization/notification.h"
 
 namespace calib::store {
@@ -177,6 +178,9 @@ TEST_F(StoreTest, StatesAndEvaluationsOfSomeSamplesAlone) {
         t.PutState({.key = key, .load_step = step, .observables = {0.5 + sample, 0.25 * step}}, 0);
       }
     }
+    t.SetEvaluation({1, 1, 0}, EvaluationStatus::kUnknown, "no", 3);
+    t.InsertEvaluation({.key = {1, 1, 1}, .digest = "e"});
+    t.SetRest({1, 2, 0}, 1);
   });
   Reader reader = Read();
   std::vector<std::vector<double>> seen;
@@ -192,7 +196,16 @@ TEST_F(StoreTest, StatesAndEvaluationsOfSomeSamplesAlone) {
   seen.clear();
   ASSERT_TRUE(reader.EachState(2, 0, 9, see).ok());
   EXPECT_TRUE(seen.empty());
-  ASSERT_EQ(reader.Evaluations(1)->size(), 4U);
+  std::string statuses;
+  ASSERT_TRUE(reader
+                  .EachStatus(1, 1, 2,
+                              [&](int sample, EvaluationStatus status, bool rests) {
+                                absl::StrAppend(&statuses, sample, " ", ToString(status),
+                                                rests ? " rests, " : ", ");
+                              })
+                  .ok());
+  EXPECT_EQ(statuses, "1 unknown, 1 waiting, 2 waiting rests, ");
+  ASSERT_EQ(reader.Evaluations(1)->size(), 5U);
   ASSERT_EQ(reader.Evaluations(1, 2)->size(), 2U);
   EXPECT_EQ(reader.Evaluations(1, 2)->front().key.sample, 2);
 }
