@@ -74,7 +74,12 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   evaluations_.clear();
   by_status_.clear();
   by_digest_.clear();
-  return Extend(reader);
+  ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
+  Take(samples, evaluations);
+  // What ended in earlier iterations is asked by plans alone.
+  return arrived_.empty() ? absl::OkStatus()
+                          : AddStates(reader, arrived_.begin()->first, arrived_.rbegin()->first);
 }
 
 std::unique_ptr<CampaignRun> CampaignRun::Unfilled() const {
@@ -94,21 +99,52 @@ void CampaignRun::Fill(CampaignRun&& reloaded) {
   arrived_ = std::move(reloaded.arrived_);
 }
 
-absl::Status CampaignRun::Extend(store::Reader& reader) {
-  ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
-  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
-  const bool everything = evaluations_.empty();
-  std::vector<store::EvaluationRecord> added;
-  std::set<int> of_samples;
+std::function<absl::StatusOr<CampaignRun::More>(store::Reader&)> CampaignRun::LookForMore() const {
+  std::vector<EvaluationKey> known;
+  known.reserve(evaluations_.size());
+  for (const auto& [key, evaluation] : evaluations_) known.push_back(key);
+  return [id = id_, known = std::move(known)](store::Reader& reader) -> absl::StatusOr<More> {
+    More more;
+    ASSIGN_OR_RETURN(more.samples, reader.Samples(id));
+    ASSIGN_OR_RETURN(more.evaluations, reader.Evaluations(id));
+    std::erase_if(more.evaluations, [&known](const store::EvaluationRecord& evaluation) {
+      return std::binary_search(known.begin(), known.end(), evaluation.key);
+    });
+    std::set<int> came_with_states;
+    for (const store::EvaluationRecord& evaluation : more.evaluations) {
+      if (evaluation.status != EvaluationStatus::kWaiting) {  // else nobody has been leased it yet
+        came_with_states.insert(evaluation.key.sample);
+      }
+    }
+    for (const int sample : came_with_states) {
+      RETURN_IF_ERROR(reader.EachState(
+          id, sample, sample,
+          [&more](const EvaluationKey& key, int load_step, std::span<const double> observables) {
+            more.states.push_back({.key = key,
+                                   .load_step = load_step,
+                                   .observables = {observables.begin(), observables.end()}});
+          }));
+    }
+    return more;
+  };
+}
+
+void CampaignRun::Take(const More& more) {
+  const std::set<EvaluationKey> taken = Take(more.samples, more.evaluations);
+  for (const More::State& state : more.states) {
+    if (taken.count(state.key) > 0) AddState(state.key, state.load_step, state.observables);
+  }
+}
+
+std::set<EvaluationKey> CampaignRun::Take(const std::vector<store::SampleRecord>& samples,
+                                          const std::vector<store::EvaluationRecord>& evaluations) {
+  std::set<EvaluationKey> taken;
   std::set<int> open = OpenSamples();
   for (const store::EvaluationRecord& evaluation : evaluations) {
     if (evaluations_.count(evaluation.key) > 0) {
       continue;
     }
-    added.push_back(evaluation);
-    if (evaluation.status != EvaluationStatus::kWaiting) {  // else nobody has been leased it yet
-      of_samples.insert(evaluation.key.sample);
-    }
+    taken.insert(taken.end(), evaluation.key);
     if (!campaign::IsTerminal(evaluation.status)) {
       open.insert(evaluation.key.sample);
     }
@@ -131,7 +167,8 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
       arrived_[sample.sample] = {.predictions = nothing};
     }
   }
-  for (const store::EvaluationRecord& evaluation : added) {
+  for (const store::EvaluationRecord& evaluation : evaluations) {
+    if (taken.count(evaluation.key) == 0) continue;
     evaluations_[evaluation.key] = {.losses = evaluation.losses,
                                     .missing = MissingSteps(PathLength(evaluation.key.experiment)),
                                     .rest_after = evaluation.rest_after,
@@ -142,20 +179,14 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     }
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
   }
-  if (everything) {  // what ended in earlier iterations is asked by plans alone
-    if (arrived_.empty()) return absl::OkStatus();
-    return AddStates(reader, arrived_.begin()->first, arrived_.rbegin()->first);
-  }
-  for (const int sample : of_samples) {
-    RETURN_IF_ERROR(AddStates(reader, sample, sample));
-  }
-  return absl::OkStatus();
+  return taken;
 }
 
 absl::Status CampaignRun::Refresh(store::Reader& reader, const std::vector<EvaluationKey>& keys) {
-  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
   std::set<int> samples;
   for (const EvaluationKey& key : keys) samples.insert(key.sample);
+  if (samples.empty()) return absl::OkStatus();
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_, *samples.begin()));
   for (const int sample : samples) {
     RETURN_IF_ERROR(AddStates(reader, sample, sample));
   }

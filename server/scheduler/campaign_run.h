@@ -81,8 +81,21 @@ class CampaignRun {
   /// given back to Fill().
   std::unique_ptr<CampaignRun> Unfilled() const;
   void Fill(CampaignRun&& reloaded);
-  /// Reads samples and evaluations that are new, and leaves the others as memory has them.
-  absl::Status Extend(store::Reader& reader);
+  /// What the store has beyond memory.
+  struct More {
+    struct State {
+      store::EvaluationKey key{};
+      int load_step = 0;
+      std::vector<double> observables{};
+    };
+    std::vector<store::SampleRecord> samples{};
+    std::vector<store::EvaluationRecord> evaluations{};
+    std::vector<State> states{};  ///< of those that came with some
+  };
+  /// Reads that, on any thread, beyond what memory has now.
+  std::function<absl::StatusOr<More>(store::Reader&)> LookForMore() const;
+  /// Takes in what is new of it, and leaves the others as memory has them.
+  void Take(const More& more);
 
   std::int64_t id() const { return id_; }
   const planning::Definition& definition() const { return *definition_; }
@@ -184,6 +197,9 @@ class CampaignRun {
     bool out = false;                ///< diverged or stopped
   };
   using ArrivedBySample = std::map<int, Arrived>;
+  /// Samples and evaluations that are new; which evaluations these are.
+  std::set<store::EvaluationKey> Take(const std::vector<store::SampleRecord>& samples,
+                                      const std::vector<store::EvaluationRecord>& evaluations);
   /// Of the samples from `first` to `last`.
   absl::Status AddStates(store::Reader& reader, int first, int last);
   void AddState(const store::EvaluationKey& key, int load_step, std::span<const double> observables,

@@ -274,22 +274,49 @@ void Scheduler::ReturnUnleased(CampaignRun& run) {
   }
 }
 
-void Scheduler::TakeIn(std::int64_t campaign, bool resumed) {
-  CampaignRun* run = FindRun(campaign);
+void Scheduler::TakeIn(const PlanWritten& written) {
+  CampaignRun* run = FindRun(written.campaign);
   if (run == nullptr) {
     return;
   }
+  for (const auto& [sample, threshold] : written.stop_below) run->SetStopBelow(sample, threshold);
+  if (!written.resumed) {
+    ExtendAside(*run, written);
+    return;
+  }
   // What workers send of a campaign while it is read would be lost.
-  if (resumed && leases_.OfCampaign(campaign).empty()) {
+  if (leases_.OfCampaign(written.campaign).empty()) {
     ReloadAside(*run);
     return;
   }
   auto reader = ports_.Read();
-  if (!reader.ok() || !(resumed ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
-    again_[campaign] = [this, campaign, resumed] { TakeIn(campaign, resumed); };
+  if (!reader.ok() || !run->Reload(*reader).ok()) {
+    again_[written.campaign] = [this, written] { TakeIn(written); };
     return;
   }
   GoOn(*run);
+}
+
+void Scheduler::ExtendAside(const CampaignRun& run, const PlanWritten& written) {
+  computing_.insert(written.campaign);
+  ports_.Load([this, written, look = run.LookForMore()]() -> std::function<void()> {
+    auto reader = ports_.Read();
+    const auto more = std::make_shared<absl::StatusOr<CampaignRun::More>>(
+        reader.ok() ? look(*reader) : reader.status());
+    return [this, written, more] {
+      computing_.erase(written.campaign);
+      CampaignRun* extended = FindRun(written.campaign);
+      if (extended == nullptr) {  // cancelled meanwhile
+        return;
+      }
+      if (!more->ok()) {
+        again_[written.campaign] = [this, written] { TakeIn(written); };
+        return;
+      }
+      extended->Take(**more);
+      GoOn(*extended);
+    };
+  });
 }
 
 void Scheduler::ReloadAside(const CampaignRun& run) {
@@ -307,7 +334,7 @@ void Scheduler::ReloadAside(const CampaignRun& run) {
         reloaded->Fill(std::move(*unfilled));
         GoOn(*reloaded);
       } else if (reloaded != nullptr) {
-        again_[campaign] = [this, campaign] { TakeIn(campaign, true); };
+        again_[campaign] = [this, campaign] { TakeIn({.campaign = campaign, .resumed = true}); };
       }
       DoneLoading(campaign);
     };

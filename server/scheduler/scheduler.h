@@ -270,9 +270,17 @@ class Scheduler {
   bool IsLoading(std::int64_t campaign, std::function<void()> then);
   /// Has the view of what has arrived since computed aside.
   void RefreshView(CampaignRun& run);
-  /// What a plan has added to the store, then what follows from it; again with the next Tick when
-  /// the store cannot be read now. resumed: something that had ended goes on.
-  void TakeIn(std::int64_t campaign, bool resumed);
+  /// What a plan has changed in the store.
+  struct PlanWritten {
+    std::int64_t campaign = 0;
+    bool resumed = false;                              ///< something that had ended goes on
+    std::vector<std::pair<int, double>> stop_below{};  ///< see planning::Plan
+  };
+  /// Takes that into memory, then what follows from it; again with the next Tick when the store
+  /// cannot be read now.
+  void TakeIn(const PlanWritten& written);
+  /// Reads aside what memory has not. Until it is taken in, the campaign is planned no further.
+  void ExtendAside(const CampaignRun& run, const PlanWritten& written);
   /// Reads aside what is stored of a campaign that nobody works on, then what follows from it.
   void ReloadAside(const CampaignRun& run);
   /// Hands out what memory has learnt of the store.

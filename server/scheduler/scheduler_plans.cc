@@ -279,10 +279,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<planning::Plan
         if (at_rest || begins) {
           durations_.erase(campaign);
         }
-        for (const auto& [sample, threshold] : stop_below) {
-          planned->SetStopBelow(sample, threshold);  // Offer() follows in TakeIn()
-        }
-        TakeIn(campaign, resumed);
+        TakeIn({.campaign = campaign, .resumed = resumed, .stop_below = stop_below});
       });
 }
 

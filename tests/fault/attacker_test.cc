@@ -26,6 +26,12 @@ using std::chrono::seconds;
 
 constexpr std::int64_t kMostGrowth = std::int64_t{64} << 20;  // bytes
 constexpr milliseconds kSlowestShow{500};
+/// AddressSanitizer keeps what was freed and takes several times as long: neither is the server's.
+#ifdef __SANITIZE_ADDRESS__
+constexpr bool kHasBounds = false;
+#else
+constexpr bool kHasBounds = true;
+#endif
 constexpr seconds kAnswered{20};
 
 /// Resident memory of a process [bytes]; 0: it is gone.
@@ -69,8 +75,10 @@ class Watch {
                 static_cast<double>(most_ - before_) / (1 << 20));
     EXPECT_GT(before_, 0);
     EXPECT_EQ(unanswered_, 0) << attack;
-    EXPECT_LE(slowest_, kSlowestShow) << attack;
-    EXPECT_LT(most_ - before_, kMostGrowth) << attack;
+    if (kHasBounds) {
+      EXPECT_LE(slowest_, kSlowestShow) << attack;
+      EXPECT_LT(most_ - before_, kMostGrowth) << attack;
+    }
     EXPECT_GT(MemoryOf(server_), 0) << attack << ": the server has ended";
   }
 
