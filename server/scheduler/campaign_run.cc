@@ -91,6 +91,7 @@ std::unique_ptr<CampaignRun> CampaignRun::Unfilled() const {
 
 void CampaignRun::Fill(CampaignRun&& reloaded) {
   ++changes_;
+  counted_.reset();
   evaluations_ = std::move(reloaded.evaluations_);
   by_status_ = std::move(reloaded.by_status_);
   by_digest_ = std::move(reloaded.by_digest_);
@@ -138,6 +139,7 @@ void CampaignRun::Take(const More& more) {
 
 std::set<EvaluationKey> CampaignRun::Take(const std::vector<store::SampleRecord>& samples,
                                           const std::vector<store::EvaluationRecord>& evaluations) {
+  counted_.reset();
   std::set<EvaluationKey> taken;
   std::set<int> open = OpenSamples();
   for (const store::EvaluationRecord& evaluation : evaluations) {
@@ -438,16 +440,42 @@ void CampaignRun::AddState(const EvaluationKey& key, int load_step,
 void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, int failures) {
   ++changes_;
   Evaluation& evaluation = evaluations_[key];
+  const bool counts = counted_ == record_.progress.iteration && IsOfRunningIteration(key.sample);
+  if (counts) counts_.Add(StatusOf(key.sample), -1);
   by_status_[evaluation.status].erase(key);
   by_status_[status].insert(key);
   evaluation.status = status;
   evaluation.failures = failures;
+  if (counts) counts_.Add(StatusOf(key.sample));
   const auto found = arrived_.find(key.sample);
   if (found != arrived_.end() &&
       (status == EvaluationStatus::kDiverged || status == EvaluationStatus::kStoppedEarly ||
        status == EvaluationStatus::kUnknown)) {
     found->second.out = true;
   }
+}
+
+campaign::SampleStatus CampaignRun::StatusOf(int sample) const {
+  campaign::SampleStatus status;
+  for (auto it = evaluations_.lower_bound({id_, sample, 0});
+       it != evaluations_.end() && it->first.sample == sample; ++it) {
+    status.Add(it->second.status, it->second.rest_after.has_value());
+  }
+  return status;
+}
+
+const campaign::SampleCounts& CampaignRun::Counts() {
+  const int iteration = record_.progress.iteration;
+  if (counted_ == iteration) return counts_;
+  counts_ = {};
+  for (auto it = evaluations_.lower_bound({id_, iteration * record_.submitted.samples, 0});
+       it != evaluations_.end() && IsOfRunningIteration(it->first.sample);) {
+    const int sample = it->first.sample;
+    counts_.Add(StatusOf(sample));
+    while (it != evaluations_.end() && it->first.sample == sample) ++it;
+  }
+  counted_ = iteration;
+  return counts_;
 }
 
 bool CampaignRun::IsCalibrated(int experiment) const {

@@ -17,6 +17,7 @@
 
 #include "absl/status/statusor.h"
 #include "inference/data/gaussian_likelihood.h"
+#include "server/campaign/model/sample_counts.h"
 #include "server/planning/definition.h"
 #include "server/planning/transitions.h"
 #include "server/scheduler/leases/worker_table.h"
@@ -171,6 +172,8 @@ class CampaignRun {
   /// Another threshold for that, see store::SampleRecord.
   void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
+  /// Samples of the running iteration.
+  const campaign::SampleCounts& Counts();
   /// Samples of the running iteration of which an evaluation diverged or is unknown, and those with
   /// nothing left to run; where points are chosen one by one the last that have ended, as many as
   /// its first iteration has.
@@ -205,6 +208,7 @@ class CampaignRun {
   void AddState(const store::EvaluationKey& key, int load_step, std::span<const double> observables,
                 Evaluation& evaluation, Arrived* arrived);
   bool IsOfRunningIteration(int sample) const;
+  campaign::SampleStatus StatusOf(int sample) const;
   bool IsCalibrated(int experiment) const;
   /// Those that have not ended.
   std::vector<store::EvaluationKey> Open() const;
@@ -231,6 +235,8 @@ class CampaignRun {
   ArrivedBySample arrived_;
   std::optional<std::size_t> planned_;                 // Results() when a plan was made last
   std::vector<std::map<int, std::size_t>> positions_;  // in the path, by experiment and load step
+  campaign::SampleCounts counts_;
+  std::optional<int> counted_;  // iteration that they are of; nothing: they are to be counted
   LiveView view_;
   std::uint64_t changes_ = 1;  // of what the view is of
   std::uint64_t looked_at_ = 0;

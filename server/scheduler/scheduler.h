@@ -44,7 +44,9 @@ struct SchedulerOptions {
 
 /// What is known of a live campaign beyond the store.
 struct LiveStatus {
-  LiveView view{};          ///< as it was computed last, aside
+  LiveView view{};    ///< as it was computed last, aside
+  int iteration = 0;  ///< that the next are of
+  campaign::SampleCounts counts{};
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
   double states_per_second = 0;
   std::string nobody_may{};  ///< why nobody may run what waits of it; empty: somebody may

@@ -68,7 +68,10 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
     return std::nullopt;
   }
   RefreshView(*run);
-  LiveStatus live{.view = run->view(), .states_per_second = StatesPerSecond(campaign)};
+  LiveStatus live{.view = run->view(),
+                  .iteration = run->progress().iteration,
+                  .counts = run->Counts(),
+                  .states_per_second = StatesPerSecond(campaign)};
   const auto& [seconds, ended] = durations_[campaign];
   const int slots = workers_.Slots();
   if (ended > 0 && slots > 0) {

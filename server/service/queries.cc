@@ -4,11 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <string_view>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/origin.h"
+#include "server/campaign/model/sample_counts.h"
 #include "server/messages/read_words.h"
 #include "server/methods/registry.h"
 #include "server/planning/definition.h"
@@ -21,7 +21,9 @@ namespace calib::service {
 
 using campaign::CampaignState;
 using campaign::Phase;
+using campaign::SampleCounts;
 using campaign::SamplePurpose;
+using campaign::SampleStatus;
 using store::EvaluationRecord;
 using store::EvaluationStatus;
 
@@ -32,93 +34,40 @@ bool RunsAreAdded(const campaign::Method* method) {
   return method != nullptr && method->chosen_by() == campaign::ChosenBy::kRequest;
 }
 
-/// Of one sample from its evaluations, in the order of its experiments: the first that has ended
-/// without a result, else how far it has come.
-class SampleStatus {
- public:
-  /// rests: it is to stop before its end.
-  void Add(EvaluationStatus status, bool rests, std::string_view reason = "") {
-    if (failed_.has_value()) return;
-    ++evaluations_;
-    switch (status) {
-      case EvaluationStatus::kDiverged:
-      case EvaluationStatus::kStoppedEarly:
-      case EvaluationStatus::kFailed:
-      case EvaluationStatus::kUnknown:
-        failed_ = status;
-        reason_ = reason;
-        at_rung_ = status == EvaluationStatus::kStoppedEarly && rests;
-        break;
-      case EvaluationStatus::kRunning:
-        begun_ = true;
-        break;
-      case EvaluationStatus::kFinished:
-        begun_ = true;
-        ++finished_;
-        break;
-      case EvaluationStatus::kWaiting:
-        break;
-    }
-  }
-  EvaluationStatus worst() const {
-    if (failed_.has_value()) return *failed_;
-    if (finished_ == evaluations_) return EvaluationStatus::kFinished;
-    return begun_ ? EvaluationStatus::kRunning : EvaluationStatus::kWaiting;
-  }
-  const std::string& reason() const { return reason_; }
-  /// Stopped there, which it may not be for ever.
-  bool at_rung() const { return at_rung_; }
-
- private:
-  std::optional<EvaluationStatus> failed_;
-  std::string reason_;
-  bool at_rung_ = false;
-  bool begun_ = false;
-  int evaluations_ = 0;
-  int finished_ = 0;
-};
-
-/// open: what rests may yet go on, which is known when its iteration ends.
-void Count(const SampleStatus& sample, bool open, v1::CampaignStatus& status) {
-  const EvaluationStatus worst = sample.worst();
-  const bool diverged = worst == EvaluationStatus::kDiverged;
-  const bool unknown = worst == EvaluationStatus::kUnknown;
-  const bool resting = open && sample.at_rung();
-  const bool stopped = worst == EvaluationStatus::kStoppedEarly && !resting;
-  const bool running = worst == EvaluationStatus::kRunning;
-  const bool done = diverged || stopped || unknown || worst == EvaluationStatus::kFinished;
-  status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
-  status.set_samples_unknown(status.samples_unknown() + (unknown ? 1 : 0));
-  status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
-  status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
-  status.set_samples_running(status.samples_running() + (running ? 1 : 0));
-  status.set_samples_done(status.samples_done() + (done ? 1 : 0));
-}
-
-/// Counts the samples of the last iteration, or the rows of the last batch of a design; how many
-/// there are.
-absl::StatusOr<int> CountSamples(store::Reader& reader, const store::CampaignRecord& record,
-                                 v1::CampaignStatus& status) {
-  const bool open = record.progress.phase == Phase::kCalibrating &&
-                    (record.progress.state == CampaignState::kRunning ||
-                     record.progress.state == CampaignState::kPaused);
+/// Samples of the last iteration, or rows of the last batch of a design, as the store has them.
+absl::StatusOr<SampleCounts> CountSamples(store::Reader& reader,
+                                          const store::CampaignRecord& record) {
   const int first = record.progress.iteration * record.submitted.samples;
-  int samples = 0;
+  SampleCounts counts;
   int last = first - 1;
   SampleStatus of_last;
   RETURN_IF_ERROR(reader.EachStatus(record.submitted.id, first,
                                     first + record.submitted.samples - 1,
                                     [&](int sample, EvaluationStatus evaluation, bool rests) {
                                       if (sample != last) {
-                                        if (samples > 0) Count(of_last, open, status);
-                                        ++samples;
+                                        if (last >= first) counts.Add(of_last);
                                         last = sample;
                                         of_last = {};
                                       }
                                       of_last.Add(evaluation, rests);
                                     }));
-  if (samples > 0) Count(of_last, open, status);
-  return samples;
+  if (last >= first) counts.Add(of_last);
+  return counts;
+}
+
+void SetCounts(const store::CampaignRecord& record, const SampleCounts& counts,
+               v1::CampaignStatus& status) {
+  // Whether what rests goes on is known when its iteration ends.
+  const bool open = record.progress.phase == Phase::kCalibrating &&
+                    (record.progress.state == CampaignState::kRunning ||
+                     record.progress.state == CampaignState::kPaused);
+  const int stopped = counts.stopped + (open ? 0 : counts.at_rung);
+  status.set_samples_running(counts.running);
+  status.set_samples_diverged(counts.diverged);
+  status.set_samples_unknown(counts.unknown);
+  status.set_samples_stopped_early(stopped);
+  status.set_samples_resting(open ? counts.at_rung : 0);
+  status.set_samples_done(counts.finished + counts.diverged + counts.unknown + stopped);
 }
 
 struct Concluded {
@@ -224,13 +173,21 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
   const auto method = methods::All().Find(record.submitted.method);
-  ASSIGN_OR_RETURN(const int samples, CountSamples(reader, record, status));
+  SampleCounts counts;
+  if (live.has_value() && live->iteration == record.progress.iteration) {
+    counts = live->counts;
+  } else {
+    ASSIGN_OR_RETURN(counts, CountSamples(reader, record));
+  }
+  SetCounts(record, counts, status);
   if (RunsAreAdded(method.get())) {  // what may be added nobody knows
     status.set_max_iterations(record.progress.iteration + 1);
-    status.set_samples(samples);
+    status.set_samples(counts.samples);
   }
   // The first iteration may have given runs besides.
-  if (method != nullptr && method->batches_vary() && samples > 0) status.set_samples(samples);
+  if (method != nullptr && method->batches_vary() && counts.samples > 0) {
+    status.set_samples(counts.samples);
+  }
   if (concluded.last.has_value()) {
     status.set_effective_sample_size(concluded.last->ess());
     status.set_best_misfit(concluded.best_misfit);
@@ -391,9 +348,12 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     }
   }
   std::map<int, SampleStatus> statuses;
+  std::map<int, std::string> reasons;
   for (const EvaluationRecord& evaluation : evaluations) {
-    statuses[evaluation.key.sample].Add(evaluation.status, evaluation.rest_after.has_value(),
-                                        evaluation.reason);
+    const int sample = evaluation.key.sample;
+    if (statuses[sample].Add(evaluation.status, evaluation.rest_after.has_value())) {
+      reasons[sample] = evaluation.reason;
+    }
   }
   std::vector<v1::Sample> messages;
   for (const store::SampleRecord& sample : samples) {
@@ -402,7 +362,7 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     message.set_iteration(sample.iteration);
     message.mutable_parameters()->Add(sample.parameters.begin(), sample.parameters.end());
     message.set_status(ToString(statuses[sample.sample].worst()));
-    message.set_reason(statuses[sample.sample].reason());
+    message.set_reason(reasons[sample.sample]);
     message.set_weight(std::exp(sample.log_weight));
     message.set_log_likelihood(sample.log_likelihood);
     const auto made = attempts.find(sample.sample);

@@ -278,7 +278,9 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
   for (std::size_t i = 0; i < workers.size(); ++i) {
     connect(i);
   }
+  bool read_all = true;
   for (int step = 0; step < 100'000 && scheduler_->live() > 0; ++step) {
+    if (read_all && step % 8 == 0) CompareCounts();
     const std::size_t i = random() % workers.size();
     const unsigned trouble = calm ? 1000 : random() % 100;
     if (trouble == 0) {  // killed and started again
@@ -297,6 +299,7 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
       ports_->Run();
     } else if (trouble == 4) {  // the store cannot be read for a while
       ports_->unreadable = 3;
+      read_all = false;         // memory waits for what it could not read
     } else if (trouble == 3) {  // the server is killed
       Restart();
       for (std::size_t k = 0; k < workers.size(); ++k) {
@@ -309,6 +312,25 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
   EXPECT_EQ(Campaign().progress.state, store::CampaignState::kFinished)
       << Campaign().progress.reason;
   EXPECT_EQ(ports_->refused, 0);
+}
+
+void SimulatedService::CompareCounts() {
+  store::Reader reader = Read();
+  for (const auto& [id, live] : scheduler_->AllLive()) {
+    const store::CampaignRecord record = Value(reader.Campaign(id));
+    EXPECT_EQ(live.iteration, record.progress.iteration);
+    std::map<int, campaign::SampleStatus> samples;
+    const int first = live.iteration * record.submitted.samples;
+    EXPECT_TRUE(reader
+                    .EachStatus(id, first, first + record.submitted.samples - 1,
+                                [&](int sample, store::EvaluationStatus status, bool rests) {
+                                  samples[sample].Add(status, rests);
+                                })
+                    .ok());
+    campaign::SampleCounts counts;
+    for (const auto& [sample, status] : samples) counts.Add(status);
+    EXPECT_EQ(live.counts, counts) << "c" << id << ", iteration " << live.iteration;
+  }
 }
 
 SimulatedService::Shift SimulatedService::RunTimed(int workers,

@@ -95,6 +95,9 @@ class SimulatedService {
   /// server is restarted now and then. calm: nothing goes wrong, one worker.
   void RunToEnd(unsigned seed, bool calm);
 
+  /// Memory counts the samples as the store has them.
+  void CompareCounts();
+
   /// One worker of one slot each, calm, in simulated time: evaluation k of the campaign takes
   /// seconds(k), its states come evenly spread over that. Until the campaign is over.
   struct Shift {
