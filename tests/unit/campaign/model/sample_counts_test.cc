@@ -10,23 +10,24 @@ namespace {
 
 using enum EvaluationStatus;
 
-SampleStatus Of(const std::vector<std::pair<EvaluationStatus, bool>>& evaluations) {
+SampleStatus SampleOf(const std::vector<std::pair<EvaluationStatus, bool>>& evaluations) {
   SampleStatus status;
   for (const auto& [evaluation, rests] : evaluations) status.Add(evaluation, rests);
   return status;
 }
 
 TEST(SampleStatus, IsTheFirstThatEndedWithoutAResultElseHowFarItHasCome) {
-  EXPECT_EQ(Of({{kWaiting, false}, {kWaiting, false}}).worst(), kWaiting);
-  EXPECT_EQ(Of({{kWaiting, false}, {kRunning, false}}).worst(), kRunning);
-  EXPECT_EQ(Of({{kFinished, false}, {kWaiting, false}}).worst(), kRunning);
-  EXPECT_EQ(Of({{kFinished, false}, {kFinished, false}}).worst(), kFinished);
-  EXPECT_EQ(Of({{kFinished, false}, {kUnknown, false}, {kDiverged, false}}).worst(), kUnknown);
-  const SampleStatus resting = Of({{kStoppedEarly, true}, {kDiverged, false}});
+  EXPECT_EQ(SampleOf({{kWaiting, false}, {kWaiting, false}}).worst(), kWaiting);
+  EXPECT_EQ(SampleOf({{kWaiting, false}, {kRunning, false}}).worst(), kRunning);
+  EXPECT_EQ(SampleOf({{kFinished, false}, {kWaiting, false}}).worst(), kRunning);
+  EXPECT_EQ(SampleOf({{kFinished, false}, {kFinished, false}}).worst(), kFinished);
+  EXPECT_EQ(SampleOf({{kFinished, false}, {kUnknown, false}, {kDiverged, false}}).worst(),
+            kUnknown);
+  const SampleStatus resting = SampleOf({{kStoppedEarly, true}, {kDiverged, false}});
   EXPECT_EQ(resting.worst(), kStoppedEarly);
   EXPECT_TRUE(resting.at_rung());
-  EXPECT_FALSE(Of({{kStoppedEarly, false}}).at_rung());
-  EXPECT_FALSE(Of({{kFailed, true}}).at_rung());
+  EXPECT_FALSE(SampleOf({{kStoppedEarly, false}}).at_rung());
+  EXPECT_FALSE(SampleOf({{kFailed, true}}).at_rung());
 }
 
 TEST(SampleStatus, TellsWhatItHasEndedBy) {
@@ -38,9 +39,10 @@ TEST(SampleStatus, TellsWhatItHasEndedBy) {
 
 TEST(SampleCounts, CountEachSampleOnceAndTakeItOutAgain) {
   const std::vector<SampleStatus> samples = {
-      Of({{kWaiting, false}}),     Of({{kRunning, false}}), Of({{kFinished, false}}),
-      Of({{kDiverged, false}}),    Of({{kUnknown, false}}), Of({{kStoppedEarly, false}}),
-      Of({{kStoppedEarly, true}}), Of({{kFailed, false}})};
+      SampleOf({{kWaiting, false}}),     SampleOf({{kRunning, false}}),
+      SampleOf({{kFinished, false}}),    SampleOf({{kDiverged, false}}),
+      SampleOf({{kUnknown, false}}),     SampleOf({{kStoppedEarly, false}}),
+      SampleOf({{kStoppedEarly, true}}), SampleOf({{kFailed, false}})};
   SampleCounts counts;
   for (const SampleStatus& sample : samples) counts.Add(sample);
   EXPECT_EQ(counts, (SampleCounts{.samples = 8,
