@@ -9,9 +9,9 @@ namespace calib::campaign {
 
 /// What varies between the files here; the rest is a small drained test of 64 grains.
 struct Laboratory {
-  std::string file = "";
-  std::string data = "";         // keys of `data` beside the file
-  std::string observables = "";  // a map
+  std::string file{};
+  std::string data{};         // keys of `data` beside the file
+  std::string observables{};  // a map
   std::string test = "triaxial_drained";
   std::string settings = "confining_pressure: 200 kPa";
   std::string control = "axial_strain";

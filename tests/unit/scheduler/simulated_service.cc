@@ -112,8 +112,10 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,
   std::map<std::string, std::string> digests;
   for (const auto& [path, content] : campaign.files) {
     digests[path] = campaign::Sha256Hex(content);
-    EXPECT_TRUE(
-        store_->WriteNow([&](store::Transaction& t) { t.PutBlob(digests[path], content); }).ok());
+    const auto put = [&digest = digests[path], &content = content](store::Transaction& t) {
+      t.PutBlob(digest, content);
+    };
+    EXPECT_TRUE(store_->WriteNow(put).ok());
   }
   store::Reader reader = Read();
   const auto outcome = campaign::ReadCampaign(*methods_, campaign.yaml, "small.yaml",

@@ -20,7 +20,10 @@ int RulesOf(store::Store& store, const testing::SmallCampaign& campaign, const s
   request.set_file_name("small.yaml");
   for (const auto& [path, content] : campaign.files) {
     const std::string digest = campaign::Sha256Hex(content);
-    EXPECT_TRUE(store.WriteNow([&](store::Transaction& t) { t.PutBlob(digest, content); }).ok());
+    const auto put = [&digest, &content = content](store::Transaction& t) {
+      t.PutBlob(digest, content);
+    };
+    EXPECT_TRUE(store.WriteNow(put).ok());
     (*request.mutable_files())[path] = digest;
   }
   auto reader = store.Read();
