@@ -187,7 +187,7 @@ TEST_F(LivePageTest, EventsTellWhatChangesThroughARestart) {
 TEST_F(LivePageTest, BesideAServerItOutlivesThatOne) {
   auto server = ServeWithPage("state", {});
   const std::string address = address_;
-  std::ofstream(At("page.err"), std::ios::trunc);
+  const std::ofstream emptied(At("page.err"), std::ios::trunc);
   Process page({"/bin/sh", "-c",
                 "exec '" CALIBCTL "' page --state '" + At("state") + "' --http 127.0.0.1:0 >'" +
                     At("page.out") + "'"},

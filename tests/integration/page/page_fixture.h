@@ -19,7 +19,7 @@ class LivePageTest : public Access {
   /// calibd over the folder `state` with a page; http_ is then its port.
   std::unique_ptr<Process> ServeWithPage(const std::string& state, std::vector<std::string> options,
                                          int http = 0) {
-    std::ofstream(At(state + ".err"), std::ios::trunc);
+    const std::ofstream emptied(At(state + ".err"), std::ios::trunc);
     options.insert(options.end(), {"--http", "127.0.0.1:" + std::to_string(http)});
     auto server = Serve(state, options);
     EXPECT_TRUE(Eventually(kPatience, [&] {
