@@ -65,6 +65,15 @@ std::shared_ptr<absl::StatusOr<std::unique_ptr<CampaignRun>>> Scheduler::ReadCam
       reader.ok() ? CampaignRun::Load(*options_.methods, *reader, campaign) : reader.status());
 }
 
+void Scheduler::StopReading() {
+  stops_reading_ = true;
+  for (const std::int64_t campaign : started_with_) {
+    for (const Waiting& waits : std::exchange(loading_[campaign], {})) {
+      waits.refuse(absl::UnavailableError("the server is going down"));
+    }
+  }
+}
+
 void Scheduler::TakeUpAll() {
   started_with_.clear();
   auto read = std::exchange(read_, {});
@@ -207,17 +216,17 @@ void Scheduler::DoneLoading(std::int64_t campaign) {
   if (waiting.empty()) {
     return;
   }
-  for (const auto& then : waiting.mapped()) {
-    then();
+  for (const Waiting& waits : waiting.mapped()) {
+    waits.then();
   }
 }
 
-bool Scheduler::IsLoading(std::int64_t campaign, std::function<void()> then) {
+bool Scheduler::IsLoading(std::int64_t campaign, std::function<void()> then, Reply refuse) {
   const auto found = loading_.find(campaign);
   if (found == loading_.end()) {
     return false;
   }
-  found->second.push_back(std::move(then));
+  found->second.push_back({.then = std::move(then), .refuse = std::move(refuse)});
   return true;
 }
 

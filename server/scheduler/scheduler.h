@@ -71,10 +71,10 @@ class Scheduler {
 
   /// Begins to read every campaign that is not over, aside. When all are read, attempts that were
   /// running get a fresh lease: their workers may come back and go on. Workers that come before
-  /// that are let in then, and so long what is wished of such a campaign waits.
+  /// that are let in then, and what is wished of such a campaign is done then.
   absl::Status Load();
-  /// What Load() has begun is left, since the process ends. On any thread.
-  void StopReading() { stops_reading_ = true; }
+  /// The process ends: what Load() has begun is left, and who waits for it gets UNAVAILABLE.
+  void StopReading();
   /// Campaigns that were there at the start and are still being read.
   std::size_t being_read() const { return started_with_.size() - read_.size(); }
 
@@ -150,7 +150,7 @@ class Scheduler {
   /// What is concluded of a campaign has changed, as by a finding that was kept.
   void Concluded(std::int64_t campaign);
   /// Campaigns that are not over.
-  std::size_t live() const { return runs_.size(); }
+  std::size_t live() const { return runs_.size() + started_with_.size(); }
   /// Evaluations that wait for a slot, and campaigns with a plan in the making.
   std::size_t queued() const { return waiting_.size(); }
   std::size_t planning() const { return computing_.size(); }
@@ -268,8 +268,9 @@ class Scheduler {
   void TakeUpNow(std::int64_t campaign);
   /// The same of one that is among those that are loading.
   void LoadAside(std::int64_t campaign);
-  /// Whether the campaign is being loaded; `then` is done once that has ended.
-  bool IsLoading(std::int64_t campaign, std::function<void()> then);
+  /// Whether the campaign is being loaded; `then` is done once that has ended, or `refuse` where it
+  /// will not.
+  bool IsLoading(std::int64_t campaign, std::function<void()> then, Reply refuse);
   /// Has the view of what has arrived since computed aside.
   void RefreshView(CampaignRun& run);
   /// What a plan has changed in the store.
@@ -327,8 +328,12 @@ class Scheduler {
   std::map<std::string, std::set<store::EvaluationKey>> parked_;  // WaitsForAnother, by digest
   std::set<std::int64_t> computing_;  // campaigns with a plan in the making
   std::set<std::int64_t> viewing_;    // and with a view in the making
-  std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
-  std::atomic<bool> stops_reading_ = false;
+  struct Waiting {
+    std::function<void()> then;
+    Reply refuse;
+  };
+  std::map<std::int64_t, std::vector<Waiting>> loading_;  // with what waits for that
+  std::atomic<bool> stops_reading_ = false;               // read where campaigns are
   std::set<std::int64_t> started_with_;  // campaigns of Load(), empty once TakeUpAll() was called
   std::map<std::int64_t, absl::StatusOr<std::unique_ptr<CampaignRun>>> read_;  // of these so far
   std::vector<store::ActiveAttempt> attempts_at_start_;                        // until then

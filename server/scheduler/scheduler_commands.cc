@@ -81,7 +81,8 @@ void Scheduler::SetState(CampaignRun& run, planning::CampaignEvent event, const 
 }
 
 void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
-  if (IsLoading(campaign, [=, this] { Pause(campaign, also, reply); })) {
+  if (IsLoading(
+          campaign, [=, this] { Pause(campaign, also, reply); }, reply)) {
     return;
   }
   CampaignRun* run = LiveRun(campaign, reply);
@@ -92,7 +93,8 @@ void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, cons
 }
 
 void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
-  if (IsLoading(campaign, [=, this] { Resume(campaign, also, reply); })) {
+  if (IsLoading(
+          campaign, [=, this] { Resume(campaign, also, reply); }, reply)) {
     return;
   }
   CampaignRun* run = LiveRun(campaign, reply);
@@ -138,7 +140,8 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
 }
 
 void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
-  if (IsLoading(campaign, [=, this] { Cancel(campaign, also, reply); })) {
+  if (IsLoading(
+          campaign, [=, this] { Cancel(campaign, also, reply); }, reply)) {
     return;
   }
   if (unreadable_.count(campaign) > 0) {
@@ -183,7 +186,8 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
 
 void Scheduler::SetPriority(const Priority& wish, const store::Store::Job& also,
                             const Reply& reply) {
-  if (IsLoading(wish.campaign, [=, this] { SetPriority(wish, also, reply); })) {
+  if (IsLoading(
+          wish.campaign, [=, this] { SetPriority(wish, also, reply); }, reply)) {
     return;
   }
   if (CampaignRun* run = FindRun(wish.campaign); run != nullptr) {
@@ -235,7 +239,8 @@ std::vector<v1::OwnerShare> Scheduler::OwnerShares() const {
 }
 
 void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
-  if (IsLoading(campaign, [=, this] { Delete(campaign, also, reply); })) {
+  if (IsLoading(
+          campaign, [=, this] { Delete(campaign, also, reply); }, reply)) {
     return;
   }
   if (const CampaignRun* run = FindRun(campaign); run != nullptr) {

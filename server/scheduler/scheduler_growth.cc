@@ -37,7 +37,9 @@ void Scheduler::AddRuns(const planning::NewRuns& runs, const GrowthReply& reply)
 }
 
 void Scheduler::Grow(const planning::NewRuns& runs, const GrowthReply& reply) {
-  if (IsLoading(runs.campaign, [this, runs, reply] { Grow(runs, reply); })) {
+  if (IsLoading(
+          runs.campaign, [this, runs, reply] { Grow(runs, reply); },
+          [reply](const absl::Status& why) { reply(why); })) {
     return;
   }
   // Of a live campaign nothing but whether the batch is there.

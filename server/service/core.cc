@@ -90,11 +90,11 @@ absl::Status Core::Start() {
 
 void Core::BeginShutdown() {
   ends_ = true;
-  scheduler_.StopReading();
   Post([this] {
     if (health_.ok()) {
       health_ = absl::UnavailableError("the server is going down");
     }
+    scheduler_.StopReading();
     for (const auto& [id, session] : sessions_) {
       session->Close(absl::UnavailableError("the server is going down"));
     }
@@ -247,8 +247,8 @@ Measured Core::Measure() const {
       .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count(),
       .store_waits = wait_.has_value(),
       .campaigns = scheduler_.live(),
-      .queued = scheduler_.queued(),
       .being_read = scheduler_.being_read(),
+      .queued = scheduler_.queued(),
       .planning = scheduler_.planning(),
       .store = store_->Numbers(),
       .acknowledgements = acknowledgements_.Read(),

@@ -43,7 +43,7 @@ experiments:
     observables: {{q_over_p: {{noise: {{relative: 0.015, floor: 0.01}}}}, volumetric_strain: {{noise: {{absolute: 6e-4}}}}}}
     role: {role}
 """
-    return text + 'inference: {method: adaptive_emulator, max_runs: 50}\nseed: 7\n'
+    return text + 'inference: {method: iterative_bayesian_filter, samples: 30, max_iterations: 3}\nseed: 7\n'
 
 
 def step(options, folder, verb, *arguments):

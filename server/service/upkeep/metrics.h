@@ -18,8 +18,8 @@ struct Measured {
 
   // ---- of the scheduler ----
   std::size_t campaigns = 0;          ///< that are not over
-  std::size_t queued = 0;             ///< evaluations that wait for a slot
   std::size_t being_read = 0;         ///< of those, at the start: workers are let in when none is
+  std::size_t queued = 0;             ///< evaluations that wait for a slot
   std::size_t planning = 0;           ///< campaigns whose next iteration is being computed
   int workers = 0;                    ///< connected
   int draining = 0;                   ///< of those
